@@ -1,0 +1,31 @@
+"""structcosim's core: blocks, systems, the master, results.
+
+from cosim import Block, Continuous, FMU, Input, Output, Parameter, State, System, simulate
+"""
+
+from .errors import CosimError
+from .fmu import FMU
+from .master import Interrupted, schedule, simulate
+from .participant import Block, Continuous, LinearContinuous
+from .result import Result
+from .system import System
+from .variables import Array, Input, Local, Output, Parameter, State
+
+__all__ = [
+    "FMU",
+    "Array",
+    "Block",
+    "Continuous",
+    "CosimError",
+    "Input",
+    "Interrupted",
+    "LinearContinuous",
+    "Local",
+    "Output",
+    "Parameter",
+    "Result",
+    "State",
+    "System",
+    "schedule",
+    "simulate",
+]

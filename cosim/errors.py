@@ -1,0 +1,58 @@
+"""Errors that say where, what, and what to do about it.
+
+Every error that a user can cause derives from `CosimError`. The command line
+prints its text and ends with exit code 2; a traceback means a defect of ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+class CosimError(Exception):
+    """An error with a place, a fact and a remedy."""
+
+
+class DeclarationError(CosimError):
+    """A block or plant is declared or constructed wrongly."""
+
+
+class WiringError(CosimError):
+    """Ports that cannot be connected: unknown name, other shape, other unit, or a cycle."""
+
+
+class CompilationError(CosimError):
+    """A kernel that Numba cannot compile, or that needs the Python runtime."""
+
+
+class FMUError(CosimError):
+    """An FMU that cannot be read, loaded or instantiated."""
+
+
+class RecordError(CosimError):
+    """A record file that cannot be read."""
+
+
+class TimeError(CosimError):
+    """A step, stop time or sample period that does not fit the communication grid."""
+
+
+class SimulationError(CosimError):
+    """A run that had to stop. What was computed until then is in `result`."""
+
+    result: Result | None = None
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """Return "; did you mean 'x'? (candidates)" for an unknown name."""
+    known = list(candidates)
+    lowered = {k.lower(): k for k in known}
+    close = get_close_matches(name.lower(), lowered, n=1, cutoff=0.6)
+    hint = f"; did you mean '{lowered[close[0]]}'?" if close else ""
+    shown = ", ".join(known[:20]) + (f", ... ({len(known)} in all)" if len(known) > 20 else "")
+    return f"{hint} (there are: {shown or 'none'})"

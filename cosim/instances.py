@@ -1,0 +1,184 @@
+"""What a run works on: a participant with memory of its own, and the operations that move it.
+
+An instance answers, for its participant, what the master asks at a communication point:
+`read` the outputs, `latch` the inputs, `advance` over the step, and for stage coupling
+set states and get derivatives. KernelInstance does so for blocks and continuous systems
+in the loop; FMUInstance (fmu_instance.py) for FMUs.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .compiler import kernel_addresses
+from .errors import CompilationError
+from .opcodes import CALL, Op
+from .participant import Block, Continuous, Participant
+from .variables import Array
+
+_KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
+_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
+
+
+class Failures:
+    """Where callbacks leave an exception for the master; a C loop cannot carry it."""
+
+    def __init__(self) -> None:
+        self.exception: BaseException | None = None
+        self.participant = ""
+        self.time = 0.0
+
+    def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
+        """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""
+
+        def guarded(_: int, t: float, h: float) -> int:
+            try:
+                function(t, h)
+            except BaseException as exception:
+                self.exception, self.participant, self.time = exception, name, t
+                return 1
+            return 0
+
+        return _KERNEL(guarded)
+
+
+class CompiledKernelsWarning(UserWarning):
+    """A block runs as a Python callback because Numba cannot compile it."""
+
+
+class KernelInstance:
+    """A Block or Continuous in the loop, compiled or called back."""
+
+    def __init__(self, name: str, participant: Participant, jit: bool, failures: Failures) -> None:
+        self.name = name
+        self.participant = participant.fresh()
+        self.base = self.participant.memory.ctypes.data
+        self.callbacks: list[Any] = []
+        self.is_compiled = jit and participant.compiled
+        self._addresses: dict[str, int] = {}
+        if self.is_compiled:
+            try:
+                self._addresses = kernel_addresses(participant)
+            except CompilationError as error:
+                warnings.warn(
+                    f"{name} runs as a Python callback, about 50 times slower: {error}. "
+                    f"Set compiled = False in {type(participant).__name__} to accept that silently",
+                    CompiledKernelsWarning,
+                    stacklevel=4,
+                )
+                self.is_compiled = False
+        if not self.is_compiled:
+            for kernel in participant.kernels:
+                callback = failures.guard(name, self._interpreted(kernel))
+                self.callbacks.append(callback)
+                self._addresses[kernel] = ctypes.cast(callback, ctypes.c_void_p).value or 0
+        states = self.participant.zones["state"]
+        self.n_states = states[1] if isinstance(participant, Continuous) else 0
+        self.state_address = self.base + 8 * states[0]
+        self.derivative_address = self.base + 8 * self.participant.zones["derivative"][0]
+        outputs = self.participant.zones["output"]
+        self._outputs = (self.base + 8 * outputs[0], outputs[1] + states[1])  # the two zones adjoin
+        self.has_outputs = outputs[1] > 0
+
+    def _interpreted(self, kernel: str) -> Callable[[float, float], None]:
+        method = getattr(self.participant, kernel)
+        times = _TIMES[kernel]
+        return lambda t, h: method(*(t, h)[:times])
+
+    def start(self, t0: float) -> None:
+        """Run `initialize`, interpreted or compiled like everything else."""
+        if "initialize" in self._addresses:
+            function = _KERNEL(self._addresses["initialize"])
+            if function(self.base, t0, 0.0) != 0 and self.is_compiled:
+                self.participant.initialize()  # type: ignore[attr-defined]  # again, for its exception
+
+    def stop(self) -> None:
+        """Nothing to release."""
+
+    def address(self, port: str) -> int:
+        """Return the address of a variable."""
+        return self.base + 8 * self.participant.variables[port].slot
+
+    def _call(self, kernel: str, text: str, fraction: float, check: tuple[int, int] = (0, 0)) -> Op:
+        how = "" if self.is_compiled else " (Python callback)"
+        return Op(
+            f"{self.name}: {text}{how}" if text else "",
+            CALL,
+            self._addresses[kernel],
+            self.base,
+            check[0],
+            n=check[1],
+            fraction=fraction,
+            participant=self.name,
+        )
+
+    def step(self, fraction: float = 0.0) -> list[Op]:
+        """Run a block."""
+        return [self._call("step", "step", fraction, self._outputs)]
+
+    def read(self, fraction: float = 0.0, text: str = "outputs") -> list[Op]:
+        """Evaluate derivatives and outputs."""
+        ops = [self._call("derivatives", "", fraction)] if "derivatives" in self._addresses else []
+        if "outputs" in self._addresses:
+            ops.append(self._call("outputs", text, fraction, self._outputs))
+        return ops
+
+    def latch(self) -> list[Op]:
+        """Inputs are read where they lie."""
+        return []
+
+    def advance(self) -> list[Op]:
+        """Carry the states over the step."""
+        return [self._call("advance", "advance", 0.0, (self.state_address, self.n_states))]
+
+    def set_states(self, fraction: float) -> list[Op]:
+        """States are combined where they lie."""
+        return []
+
+    def derivatives(self, target: int, fraction: float) -> list[Op]:
+        """Evaluate everything and copy the derivatives to `target`."""
+        from .opcodes import COPY
+
+        read = self.read(fraction, text="derivatives")
+        if "outputs" not in self._addresses:
+            read = [self._call("derivatives", "derivatives", fraction)]
+        copy = Op("", COPY, a=self.derivative_address, b=target, n=self.n_states, weights=(1.0, 0.0))
+        return [*read, copy]
+
+    def complete(self) -> list[Op]:
+        """Nothing happens between steps."""
+        return []
+
+    def feedthrough(self) -> dict[str, set[str]]:
+        """Return, for every output, the inputs on which it depends directly."""
+        inputs = {n for n, v in self.participant.variables.items() if v.kind == "input"}
+        kinds = {n: v.kind for n, v in self.participant.variables.items()}
+        found = {n: d & inputs for n, d in self.participant.dependencies().items() if kinds[n] == "output"}
+        return found | {n: set() for n, kind in kinds.items() if kind == "state"}
+
+    def locate(self, slot_address: int) -> str:
+        """Return the name of the variable at an address, for an error message."""
+        slot = (slot_address - self.base) // 8
+        for name, v in self.participant.variables.items():
+            if v.slot <= slot < v.slot + v.size:
+                return name if not v.shape else f"{name}[{slot - v.slot + 1}]"
+        return "?"
+
+    def log(self) -> list[str]:
+        """Kernels do not log."""
+        return []
+
+
+def is_block(participant: Any) -> bool:
+    """Tell whether a participant acts at communication points."""
+    return isinstance(participant, Block)
+
+
+def buffer(n: int) -> Array:
+    """Return memory for n floats; never empty, so that it has an address."""
+    return np.zeros(max(n, 1))

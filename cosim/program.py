@@ -1,0 +1,332 @@
+"""From a system to the table of operations that the loop runs: the schedule.
+
+Sampled coupling, one communication step (DESIGN: "Time"):
+    at t_k      outputs of FMUs and Continuous participants; blocks that are due, in the
+                order of their connections; record
+    to t_{k+1}  latch all inputs; advance every FMU and Continuous by h
+
+Stage coupling: all FMUs (Model Exchange) and Continuous participants are integrated
+together by a fixed-step Runge-Kutta method; the blocks run at every stage, those with a
+sample period at the communication points only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from graphlib import CycleError, TopologicalSorter
+from typing import TypeAlias
+
+import numpy as np
+
+from .errors import TimeError, WiringError
+from .fmu import FMU
+from .fmu_instance import FMUInstance
+from .instances import Failures, KernelInstance, buffer
+from .opcodes import COMBINE, COPY, RECORD, STATISTICS, Op
+from .participant import Block
+from .system import Connection, Port, System, cycle_text
+from .tableaus import TABLEAUS
+from .variables import Array
+
+Instance: TypeAlias = KernelInstance | FMUInstance
+
+
+def steps_between(period: float, h: float, what: str) -> int:
+    """Return period / h, a whole number of steps; another ratio is refused."""
+    ratio = period / h
+    steps = round(ratio)
+    if steps < 1 or abs(ratio - steps) > 1e-9 * max(steps, 1):
+        near = period / max(round(ratio + 0.5), 1)
+        raise TimeError(
+            f"{what} of {period:g} s is {ratio:.6g} communication steps of {h:g} s; "
+            f"it must be a whole number of them: choose a step such as {near:.6g} s"
+        )
+    return steps
+
+
+@dataclass
+class Signals:
+    """Ports to record or to keep statistics of, as addresses of single floats."""
+
+    ports: list[Port]
+    addresses: Array
+
+
+class Program:
+    """The table of operations of one run, and the instances that it works on."""
+
+    def __init__(
+        self,
+        system: System,
+        h: float,
+        coupling: str,
+        solver: str,
+        record: list[Port],
+        statistics: list[Port],
+        decimation: int,
+        jit: bool,
+    ) -> None:
+        self.system = system
+        self.h = h
+        self.failures = Failures()
+        self.instances: dict[str, Instance] = {}
+        self.buffers: list[Array] = []
+        self.first: list[Op] = []
+        self.second: list[Op] = []
+        self.recorded = record
+        self.watched = statistics
+        self.coupling = coupling if coupling == "sampled" else f"stage coupling, {solver}"
+        stage = coupling != "sampled"
+        used = {
+            (p.participant, p.name) for p in [*record, *statistics, *(c.source for c in system.connections)]
+        }
+        try:
+            for name, member in system.participants.items():
+                ports = {port for participant, port in used if participant == name}
+                self.instances[name] = self._instance(name, member, stage, jit, ports)
+            self.order = system.block_order()
+            self.rates = {name: self._rate(name) for name in self.order}
+            delays = self._delays()
+            if stage:
+                self._stage_coupling(solver, delays, decimation)
+            else:
+                self._sampled_coupling(delays, decimation)
+        except BaseException:
+            self.close()
+            raise
+
+    # -------------------------------------------------------------------- participants
+
+    def _instance(self, name: str, member: object, stage: bool, jit: bool, used: set[str]) -> Instance:
+        if not isinstance(member, FMU):
+            return KernelInstance(name, member, jit, self.failures)  # type: ignore[arg-type]
+        if stage and not member.has_me:
+            raise WiringError(
+                f"{name} ({member.path.name}) has no Model Exchange, which stage coupling needs; "
+                'use coupling="sampled" or export it with Model Exchange'
+            )
+        return FMUInstance(name, member, stage or not member.has_cs, self.failures, used)
+
+    def _rate(self, name: str) -> int | None:
+        """Return every how many steps a block acts; None when it follows the coupling."""
+        block = self.system.participants[name]
+        assert isinstance(block, Block)
+        if block.sample_period is not None:
+            return steps_between(block.sample_period, self.h, f"{name}: sample period")
+        return block.every
+
+    def close(self) -> None:
+        """Free the FMU instances."""
+        for instance in self.instances.values():
+            instance.stop()
+
+    def _is_block(self, name: str) -> bool:
+        return isinstance(self.system.participants[name], Block)
+
+    # --------------------------------------------------------------------- connections
+
+    def _address(self, port: Port) -> int:
+        return self.instances[port.participant].address(port.name) + 8 * port.first
+
+    def _delays(self) -> dict[int, Array]:
+        """Return the memory of the connections that are one step late, by their index."""
+        delays = {}
+        for i, c in enumerate(self.system.connections):
+            if c.initial is not None:
+                delays[i] = np.array(np.broadcast_to(c.initial, c.source.count), dtype=np.float64)
+                self.buffers.append(delays[i])
+        return delays
+
+    def _copies(self, name: str, delays: dict[int, Array], every: int = 1) -> list[Op]:
+        """Return the operations that bring the inputs of a participant."""
+        ops = []
+        for i, c in enumerate(self.system.connections):
+            if c.target.participant == name:
+                source = delays[i].ctypes.data if i in delays else self._address(c.source)
+                ops += self._copy(c, source, every)
+        return ops
+
+    def _copy(self, c: Connection, source: int, every: int) -> list[Op]:
+        target = self._address(c.target)
+        weights = (c.scale, c.offset)
+        op = Op(str(c), COPY, a=source, b=target, n=c.source.count, every=every, weights=weights)
+        if c.source.count == c.target.count:
+            return [op]
+        rest = [replace(op, text="", b=target + 8 * j) for j in range(1, c.target.count)]
+        return [op, *rest]
+
+    def _remember(self, delays: dict[int, Array]) -> list[Op]:
+        """Return the operations that keep the sources of delayed connections for the next step."""
+        ops = []
+        for i, memory in delays.items():
+            source = self.system.connections[i].source
+            text = f"keep {source} for the next step"
+            address = self._address(source)
+            ops.append(Op(text, COPY, a=address, b=memory.ctypes.data, n=source.count, weights=(1.0, 0.0)))
+        return ops
+
+    def _block(self, name: str, delays: dict[int, Array], fraction: float = 0.0, every: int = 1) -> list[Op]:
+        instance = self.instances[name]
+        assert isinstance(instance, KernelInstance)
+        return [
+            *self._copies(name, delays, every),
+            *(replace(op, every=every) for op in instance.step(fraction)),
+        ]
+
+    # ----------------------------------------------------------------- recorded signals
+
+    def _signals(self, ports: Iterable[Port]) -> Signals:
+        ports = list(ports)
+        addresses = [self._address(p) + 8 * i for p in ports for i in range(p.count)]
+        table = np.array(addresses or [0], dtype=np.int64)
+        self.buffers.append(table)  # type: ignore[arg-type]
+        return Signals(ports, table)  # type: ignore[arg-type]
+
+    def _sinks(self, decimation: int) -> list[Op]:
+        """Return the operations that record and keep statistics; the master sets the record buffer."""
+        record, watch = self._signals(self.recorded), self._signals(self.watched)
+        n = sum(p.count for p in record.ports)
+        m = sum(p.count for p in watch.ports)
+        self.statistics = np.tile([np.inf, -np.inf, 0.0, 0.0], (max(m, 1), 1))
+        ops = []
+        if m:
+            a, b = int(watch.addresses.ctypes.data), int(self.statistics.ctypes.data)
+            ops.append(Op(f"statistics of {_names(watch.ports)}", STATISTICS, a=a, b=b, n=m))
+        if n:
+            a = int(record.addresses.ctypes.data)
+            ops.append(Op(f"record {_names(record.ports)}", RECORD, a=a, n=n, every=decimation))
+        self.columns = n
+        return ops
+
+    # ----------------------------------------------------------------- sampled coupling
+
+    def _sampled_coupling(self, delays: dict[int, Array], decimation: int) -> None:
+        moving = [n for n in self.instances if not self._is_block(n)]
+        for name in moving:
+            if self.instances[name].has_outputs:
+                self.first += self.instances[name].read()
+        for name in self.order:
+            self.first += self._block(name, delays, every=self.rates[name] or 1)
+        self.first += self._sinks(decimation)
+        self.first += self._remember(delays) if delays else []
+        for name in moving:
+            self.second += [*self._copies(name, delays), *self.instances[name].latch()]
+        for name in moving:
+            self.second += self.instances[name].advance()
+
+    # ------------------------------------------------------------------- stage coupling
+
+    def _stage_coupling(self, solver: str, delays: dict[int, Array], decimation: int) -> None:
+        nodes, rows, weights = TABLEAUS[solver]
+        moving = [n for n in self.instances if not self._is_block(n)]
+        order = self._stage_order(moving)
+        work = {n: buffer((1 + len(nodes)) * self.instances[n].n_states) for n in moving}
+        self.buffers += work.values()
+        for stage, (c, row) in enumerate(zip(nodes, rows, strict=True)):
+            ops: list[Op] = []
+            for name in moving:
+                if stage > 0:
+                    ops += self._state_of(name, work[name], row, f"{name}: states of stage {stage + 1}")
+                ops += self.instances[name].set_states(c)
+            ops += self._evaluation(order, delays, c, stage)
+            if stage == 0:
+                self.first = [*ops, *self._sinks(decimation), *self._remember(delays)]
+                for name in moving:
+                    instance = self.instances[name]
+                    save = Op("", COPY, a=instance.state_address, n=instance.n_states, weights=(1.0, 0.0))
+                    self.second.append(replace(save, b=int(work[name].ctypes.data)))
+            else:
+                self.second += ops
+            for name in moving:
+                instance = self.instances[name]
+                slopes = int(work[name].ctypes.data) + 8 * instance.n_states * (1 + stage)
+                self.second += self._with_inputs(name, delays)
+                self.second += instance.derivatives(slopes, c)
+        for name in moving:
+            self.second += self._state_of(name, work[name], weights, f"{name}: states at t + h")
+            self.second += [*self.instances[name].set_states(1.0), *self.instances[name].complete()]
+
+    def _state_of(self, name: str, work: Array, weights: tuple[float, ...], text: str) -> list[Op]:
+        instance = self.instances[name]
+        n, base = instance.n_states, int(work.ctypes.data)
+        a, b, c = base, base + 8 * n, instance.state_address
+        return [Op(text, COMBINE, a=a, b=b, c=c, n=n, weights=weights)] if n else []
+
+    def _with_inputs(self, name: str, delays: dict[int, Array]) -> list[Op]:
+        return [*self._copies(name, delays), *self.instances[name].latch()]
+
+    def _evaluation(self, order: list[str], delays: dict[int, Array], c: float, stage: int) -> list[Op]:
+        """Return one evaluation of all outputs and blocks at a stage, in the order of dependence."""
+        ops: list[Op] = []
+        for node in order:
+            name, _, when = node.partition(":")
+            if not when:
+                rate = self.rates[name]
+                if rate is None or stage == 0:
+                    ops += self._block(name, delays, c, rate or 1)
+            elif when == "late":
+                ops += [*self._with_inputs(name, delays), *self.instances[name].read(c)]
+            else:
+                ops += self.instances[name].read(c)
+        return ops
+
+    def _stage_order(self, moving: list[str]) -> list[str]:
+        """Order blocks and outputs by dependence.
+
+        A participant is read early for the outputs that do not depend on its inputs
+        ("plant:early"), and late, after its inputs are known, for those that do
+        ("plant:late").
+        """
+        graph: dict[str, list[str]] = {}
+        through = {n: self.instances[n].feedthrough() for n in moving}
+        used = [*self.recorded, *self.watched, *(c.source for c in self.system.connections)]
+        for name in self.instances:
+            if name not in moving:
+                graph[name] = []
+            elif self.instances[name].has_outputs:
+                ports = {p.name for p in used if p.participant == name}
+                if any(not through[name].get(p) for p in ports):
+                    graph[f"{name}:early"] = []
+                if any(through[name].get(p) for p in ports):
+                    graph[f"{name}:late"] = []
+        for c in self.system.connections:
+            if c.initial is not None:
+                continue
+            a, b = c.source.participant, c.target.participant
+            direct = a in moving and through[a].get(c.source.name)
+            source = f"{a}:late" if direct else (f"{a}:early" if a in moving else a)
+            if b in moving:
+                # a late reading follows the inputs on which an output in use depends
+                needed = set().union(*through[b].values())
+                if f"{b}:late" in graph and c.target.name in needed and source in graph:
+                    graph[f"{b}:late"].append(source)
+            elif source in graph:
+                graph[b].append(source)
+        try:
+            return list(TopologicalSorter(graph).static_order())
+        except CycleError as error:
+            path = [n.partition(":")[0] for n in error.args[1]]
+            raise WiringError(cycle_text(path, self.system.connections)) from None
+
+    # ------------------------------------------------------------------------- as text
+
+    def tables(self) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.int64]], Array]:
+        """Return the integer and the float part of the table."""
+        ops = [*self.first, *self.second]
+        integers = np.array([op.integers(i) for i, op in enumerate(ops)], dtype=np.int64)
+        return integers.reshape(-1, 9), np.array([op.floats() for op in ops], dtype=np.float64)
+
+    def schedule(self) -> str:
+        """Return the schedule of one communication step, a line an operation."""
+
+        def lines(ops: list[Op]) -> list[str]:
+            rated = ((op, f" (every {op.every})" if op.every > 1 else "") for op in ops if op.text)
+            return [f"  {op.text}{rate}" for op, rate in rated]
+
+        title = "sampled coupling" if self.coupling == "sampled" else self.coupling
+        return "\n".join([title, "at t_k:", *lines(self.first), "to t_k+1:", *lines(self.second)])
+
+
+def _names(ports: list[Port]) -> str:
+    return ", ".join(map(str, ports))

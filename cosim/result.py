@@ -1,0 +1,112 @@
+"""The result of a run: signals over time, statistics over all communication points."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import RecordError, WiringError, did_you_mean
+from .variables import Array
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics of one port over all communication points 0..n, with its shape (m,) or as numbers.
+
+    minimum, maximum, mean, rms; peak, the largest magnitude; norm, the root of the sum of squares.
+    """
+
+    minimum: Any
+    maximum: Any
+    mean: Any
+    rms: Any
+    norm: Any
+
+    @property
+    def peak(self) -> Any:
+        """The largest magnitude."""
+        return np.maximum(np.abs(self.minimum), np.abs(self.maximum))
+
+
+@dataclass
+class Result:
+    """Signals by port name ("plant.x"), their units and statistics.
+
+    time
+        (r,) recorded communication points in s
+    signals
+        port name -> (r,) or (r, m)
+    interrupted
+        True when the run was stopped before its end; what was computed is here
+    """
+
+    time: Array
+    signals: dict[str, Array]
+    units: dict[str, str | None]
+    statistics: dict[str, Statistics] = field(default_factory=dict)
+    step: float = 0.0
+    steps: int = 0
+    seconds: float = 0.0
+    schedule: str = ""
+    interrupted: bool = False
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.signals:
+            raise WiringError(f"the result has no signal '{name}'" + did_you_mean(name, self.signals))
+        return self.signals[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    def columns(self) -> dict[str, Array]:
+        """Return every scalar as a column of its own: "building.accel[3]" -> (r,)."""
+        flat: dict[str, Array] = {}
+        for name, values in self.signals.items():
+            if values.ndim == 1:
+                flat[name] = values
+            else:
+                flat |= {f"{name}[{i + 1}]": values[:, i] for i in range(values.shape[1])}
+        return flat
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the signals: .npz (exact, with units) or .csv (17 digits)."""
+        path = Path(path)
+        if path.suffix == ".npz":
+            meta = json.dumps({"units": self.units, "step": self.step, "interrupted": self.interrupted})
+            arrays: dict[str, Any] = {"time": self.time, **self.signals}
+            np.savez(path, _meta=np.array(meta), **arrays)
+        elif path.suffix == ".csv":
+            columns = {"time": self.time, **self.columns()}
+            header = ",".join(f'"{n}"' if "," in n else n for n in columns)
+            np.savetxt(
+                path, np.column_stack(list(columns.values())), "%.17g", ",", header=header, comments=""
+            )
+        else:
+            raise RecordError(f"cannot write a result as '{path.suffix}'; choose .npz or .csv")
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Result:
+        """Read what `save` wrote as .npz."""
+        try:
+            with np.load(path) as data:
+                meta = json.loads(str(data["_meta"]))
+                signals = {n: data[n] for n in data.files if n not in ("_meta", "time")}
+                return cls(
+                    data["time"], signals, meta["units"], step=meta["step"], interrupted=meta["interrupted"]
+                )
+        except (OSError, ValueError, KeyError) as error:
+            raise RecordError(f"{path} is no result that was saved as .npz: {error}") from error
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a DataFrame with the time as index; needs pandas."""
+        import pandas
+
+        return pandas.DataFrame(self.columns(), index=pandas.Index(self.time, name="time"))

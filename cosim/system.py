@@ -1,0 +1,205 @@
+"""A system: participants by name, and connections between their ports.
+
+    system = System(
+        {"plant": FMU("plant.fmu"), "control": SwitchingControl(M=100.0)},
+        [("plant.s", "control.s"), ("control.u", "plant.u")],
+    )
+
+A port is named `participant.port`; elements of an array count from 1, as in Modelica
+and in FMU variable names: `building.accel[3]`, `building.accel[2:4]`. Everything that
+can be checked without time is checked here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeAlias
+
+from .errors import WiringError, did_you_mean
+from .participant import Block, Participant
+from .units import conversion
+from .variables import Array
+
+if TYPE_CHECKING:
+    from .fmu import FMU
+
+Member: TypeAlias = "Participant | FMU"
+
+
+@dataclass(frozen=True)
+class Port:
+    """One end of a connection: `count` floats of a participant's port, from `first` on."""
+
+    participant: str
+    name: str
+    shape: tuple[int, ...]
+    unit: str | None
+    first: int = 0
+    count: int = 1
+    index: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.participant}.{self.name}{self.index}"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """source -> target, with target = scale * source + offset; `initial` makes it one step late."""
+
+    source: Port
+    target: Port
+    scale: float = 1.0
+    offset: float = 0.0
+    initial: Array | float | None = None
+
+    def __str__(self) -> str:
+        delayed = "" if self.initial is None else " (one step late)"
+        factor = (
+            "" if (self.scale, self.offset) == (1.0, 0.0) else f" [{self.source.unit} -> {self.target.unit}]"
+        )
+        return f"{self.target} <- {self.source}{factor}{delayed}"
+
+
+def inputs_of(member: Member) -> dict[str, tuple[tuple[int, ...], str | None]]:
+    """Return the input ports of a participant: name -> (shape, unit)."""
+    if isinstance(member, Participant):
+        return {n: (v.shape, v.unit) for n, v in member.variables.items() if v.kind == "input"}  # type: ignore[misc]
+    return member.inputs
+
+
+def outputs_of(member: Member) -> dict[str, tuple[tuple[int, ...], str | None]]:
+    """Return the ports that can be read: outputs and states."""
+    if isinstance(member, Participant):
+        kinds = ("output", "state")
+        return {n: (v.shape, v.unit) for n, v in member.variables.items() if v.kind in kinds}  # type: ignore[misc]
+    return member.outputs
+
+
+class System:
+    """Participants by name and the connections between them."""
+
+    def __init__(
+        self,
+        participants: Mapping[str, Member] | None = None,
+        connections: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        self.participants: dict[str, Member] = {}
+        self.connections: list[Connection] = []
+        for name, member in (participants or {}).items():
+            self.add(name, member)
+        for source, target in connections:
+            self.connect(source, target)
+
+    def add(self, name: str, member: Member) -> None:
+        """Add a participant under a name (letters, digits, underscores)."""
+        if not re.fullmatch(r"[A-Za-z_]\w*", name):
+            raise WiringError(f"participant name '{name}' must be letters, digits and underscores")
+        if name in self.participants:
+            raise WiringError(f"there is a participant '{name}' already; choose another name")
+        if any(member is other for other in self.participants.values()):
+            raise WiringError(f"'{name}' is the same object as another participant; make a second one")
+        self.participants[name] = member
+
+    def connect(self, source: str, target: str, *, initial: Array | float | None = None) -> None:
+        """Connect an output or state to an input.
+
+        The same unit is passed through, a compatible one converted, any other refused. A
+        scalar output may feed every element of an array input. `initial` delays the
+        connection by one communication step and is the value at the first point: the way
+        to break a cycle of blocks.
+        """
+        out = self.port(source, "output")
+        into = self.port(target, "input")
+        if out.count != into.count and out.count != 1:
+            raise WiringError(
+                f"{out} has shape {out.shape if not out.index else (out.count,)}, "
+                f"{into} has shape {into.shape if not into.index else (into.count,)}; "
+                "connect elements or slices, such as building.accel[2:4]"
+            )
+        for other in self.connections:
+            same = (other.target.participant, other.target.name) == (into.participant, into.name)
+            overlap = other.target.first < into.first + into.count and into.first < (
+                other.target.first + other.target.count
+            )
+            if same and overlap:
+                raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
+        try:
+            scale, offset = conversion(out.unit, into.unit)
+        except WiringError as error:
+            raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
+        self.connections.append(Connection(out, into, scale, offset, initial))
+        self.block_order()
+
+    def port(self, text: str, direction: str) -> Port:
+        """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
+        where, dot, name = text.partition(".")
+        if not dot or where not in self.participants:
+            raise WiringError(
+                f"'{text}': there is no participant '{where}'" + did_you_mean(where, self.participants)
+                if dot
+                else f"'{text}' is no port; write participant.port"
+            )
+        member = self.participants[where]
+        ports = inputs_of(member) if direction == "input" else outputs_of(member)
+        if name in ports:
+            shape, unit = ports[name]
+            count = 1
+            for n in shape:
+                count *= n
+            return Port(where, name, shape, unit, 0, count)
+        base, bracket, index = name.partition("[")
+        if bracket and base in ports:
+            return _element(Port(where, base, *ports[base]), bracket + index)
+        others = outputs_of(member) if direction == "input" else inputs_of(member)
+        if base in others:
+            raise WiringError(
+                f"{text} is an {'output' if direction == 'input' else 'input'}, not an {direction}"
+            )
+        raise WiringError(f"{where} has no {direction} '{base}'" + did_you_mean(base, ports))
+
+    def block_order(self) -> list[str]:
+        """Return the blocks in the order of their connections; a cycle of blocks is an error."""
+        blocks = [n for n, m in self.participants.items() if isinstance(m, Block)]
+        graph: dict[str, list[str]] = {name: [] for name in blocks}
+        for c in self.connections:
+            a, b = c.source.participant, c.target.participant
+            if a in graph and b in graph and c.initial is None:
+                graph[b].append(a)
+        try:
+            return list(TopologicalSorter(graph).static_order())
+        except CycleError as error:
+            raise WiringError(cycle_text(error.args[1], self.connections)) from None
+
+
+def cycle_text(path: list[str], connections: list[Connection]) -> str:
+    """Return the message for an algebraic cycle through the named participants."""
+    links = []
+    for a, b in pairwise(path):
+        found = [c for c in connections if (c.source.participant, c.target.participant) == (a, b)]
+        links.append(f"{found[0].source} -> {found[0].target}" if found else f"{a} -> {b}")
+    return (
+        f"algebraic cycle: {', '.join(links)}; break it with connect(..., initial=...), "
+        "which makes that connection one communication step late"
+    )
+
+
+def _element(port: Port, index: str) -> Port:
+    """Return the part of an array port that an index such as [3], [2:4] or [2,1] names."""
+    match = re.fullmatch(r"\[(\d+)(?:([:,])(\d+))?\]", index)
+    shape = port.shape
+    rank = 2 if match and match[2] == "," else 1
+    if not match or len(shape) != rank:
+        raise WiringError(
+            f"'{port}{index}': cannot index shape {shape} so; write [3] or [2:4], for a matrix [2,1]"
+        )
+    a, b = int(match[1]), int(match[3] or match[1])
+    low = (a, b) if rank == 2 else (a, a)
+    if min(a, b) < 1 or a > shape[0] or b > shape[-1] or (rank == 1 and b < a):
+        raise WiringError(f"'{port}{index}' is outside shape {shape}; elements count from 1")
+    if rank == 2:
+        return Port(port.participant, port.name, shape, port.unit, (a - 1) * shape[1] + b - 1, 1, index)
+    return Port(port.participant, port.name, shape, port.unit, low[0] - 1, b - a + 1, index)
