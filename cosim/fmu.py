@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import FMUError, did_you_mean
+from .participant import Participant
 
 _NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
 
@@ -52,9 +53,11 @@ class FMU:
         import fmpy
 
         self.path = Path(path)
+        #: the participant that was exported to this file, where that is known
+        self.source: Participant | None = None
         self.start = dict(start or {})
         self.substeps = substeps
-        self.description = _description(self.path)
+        self.description = read_description(self.path)
         self.has_cs = self.description.coSimulation is not None
         self.has_me = self.description.modelExchange is not None
         self._check_platform(fmpy.platform)
@@ -67,6 +70,10 @@ class FMU:
         self.input_ports = _group(writable)
         self.inputs = {n: (p.shape, p.unit) for n, p in self.input_ports.items()}
         self.outputs = {n: (p.shape, p.unit) for n, p in self.output_ports.items()}
+        #: the outputs proper, without local variables: what is recorded unless it is said
+        self.declared_outputs = [
+            n for n, p in self.output_ports.items() if p.variables[0].causality == "output"
+        ]
         for name in self.start:
             if name not in self.variables and name not in _group(self.variables.values()):
                 raise FMUError(
@@ -105,6 +112,13 @@ class FMU:
             found[name] = needs
         return found
 
+    @staticmethod
+    def unit_of(variable: Any) -> str | None:
+        """Return the unit of one of FMPy's variables, its own or its declared type's."""
+        declared = variable.declaredType
+        unit = variable.unit or (declared.unit if declared is not None else None)
+        return str(unit) if unit else None
+
     def __repr__(self) -> str:
         kinds = " and ".join(
             k for k, has in (("Co-Simulation", self.has_cs), ("Model Exchange", self.has_me)) if has
@@ -112,7 +126,8 @@ class FMU:
         return f"FMU({self.path.name}: FMI {self.description.fmiVersion}, {kinds})"
 
 
-def _description(path: Path) -> Any:
+def read_description(path: Path) -> Any:
+    """Read and validate the model description of an FMU; return FMPy's object."""
     import fmpy
     from lxml.etree import XMLSyntaxError
 
@@ -150,12 +165,6 @@ def _extracted(path: Path) -> Path:
         raise FMUError(f"{path} cannot be extracted: {error}") from error
 
 
-def _unit(variable: Any) -> str | None:
-    declared = variable.declaredType
-    unit = variable.unit or (declared.unit if declared is not None else None)
-    return str(unit) if unit else None
-
-
 def _group(variables: Any) -> dict[str, FMUPort]:
     """Join scalar variables `x[1]`, `x[2]` (or `K[1,1]`, ...) to array ports; keep the others."""
     groups: dict[str, dict[tuple[int, ...], Any]] = {}
@@ -166,16 +175,16 @@ def _group(variables: Any) -> dict[str, FMUPort]:
             index = tuple(int(i) for i in match[2].split(","))
             groups.setdefault(match[1], {})[index] = v
         else:
-            ports[v.name] = FMUPort(v.name, (), _unit(v), v.type, (v,))
+            ports[v.name] = FMUPort(v.name, (), FMU.unit_of(v), v.type, (v,))
     for base, members in groups.items():
         shape = tuple(max(index[d] for index in members) for d in range(len(next(iter(members)))))
         count = 1
         for n in shape:
             count *= n
-        kinds = {(v.type, _unit(v)) for v in members.values()}
+        kinds = {(v.type, FMU.unit_of(v)) for v in members.values()}
         ordered = sorted(members)
         if base in ports or len(members) != count or len(kinds) != 1 or ordered[0] != (1,) * len(shape):
-            ports |= {v.name: FMUPort(v.name, (), _unit(v), v.type, (v,)) for v in members.values()}
+            ports |= {v.name: FMUPort(v.name, (), FMU.unit_of(v), v.type, (v,)) for v in members.values()}
             continue
         type_, unit = kinds.pop()
         ports[base] = FMUPort(base, shape, unit, type_, tuple(members[i] for i in ordered))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -64,7 +65,6 @@ class FMUInstance:
         self.messages: list[str] = []
         self.model_exchange = model_exchange
         interface = fmu.description.modelExchange if model_exchange else fmu.description.coSimulation
-        self.needs_completed = model_exchange and not interface.completedIntegratorStepNotNeeded
         make = FMU2Model if model_exchange else FMU2Slave
         try:
             self.api: Any = make(
@@ -86,6 +86,7 @@ class FMUInstance:
         self.state_address = int(self.states.ctypes.data)
         self.has_outputs = bool(readable)
         self.flags = np.zeros(2, dtype=np.int32)
+        self.event_time = np.array([np.inf])
         self.stages = buffer(5 * self.n_states)
         self.failures = failures
         self.event_callback: Any = None
@@ -261,23 +262,23 @@ class FMUInstance:
 
     def complete(self) -> list[Op]:
         """Tell the model that a step is completed; handle its events."""
-        ops = []
-        if self.needs_completed:
-            function = self._function("fmi2CompletedIntegratorStep")
-            flags = int(self.flags.ctypes.data)
-            ops.append(Op("", FMI2_COMPLETED, function, self._component, flags, participant=self.name))
-        indicators = int(self.fmu.description.numberOfEventIndicators or 0)
-        if self.needs_completed or indicators or self.next_event is not None:
-            if self.event_callback is None:
-                self.event_callback = self.failures.guard(self.name, self._handle_events)
-            address = ctypes.cast(self.event_callback, ctypes.c_void_p).value or 0
+        # always told, even where the model says that it need not be: FMPy reads that flag inverted
+        function = self._function("fmi2CompletedIntegratorStep")
+        flags, event_time = int(self.flags.ctypes.data), int(self.event_time.ctypes.data)
+        told = Op("", FMI2_COMPLETED, function, self._component, flags, self._events_address(), event_time)
+        ops = [replace(told, fraction=1.0, participant=self.name)]
+        if int(self.fmu.description.numberOfEventIndicators or 0):
             text = f"{self.name}: events (Python callback)"
-            ops.append(Op(text, CALL, address, fraction=1.0, participant=self.name))
+            ops.append(Op(text, CALL, self._events_address(), fraction=1.0, participant=self.name))
         return ops
+
+    def _events_address(self) -> int:
+        if self.event_callback is None:
+            self.event_callback = self.failures.guard(self.name, self._handle_events)
+        return ctypes.cast(self.event_callback, ctypes.c_void_p).value or 0
 
     # -------------------------------------------------------------------------- events
 
-    next_event: float | None = None
     _signs: Any = None
 
     def _handle_events(self, t: float, h: float) -> None:
@@ -286,7 +287,7 @@ class FMUInstance:
         self.api.getEventIndicators(z.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), n)
         signs = z > 0
         state_event = self._signs is not None and bool((signs != self._signs).any())
-        time_event = self.next_event is not None and t >= self.next_event - 1e-9 * h
+        time_event = t + 1e-9 * h >= self.event_time[0]
         if state_event or time_event or self.flags[0]:
             self.api.enterEventMode()
             self._discrete_states()
@@ -305,7 +306,7 @@ class FMUInstance:
                 raise FMUError(f"{self.name} asked to end the simulation during event iteration")
             if not again:
                 break
-        self.next_event = float(time) if timed else None
+        self.event_time[0] = time if timed else np.inf
 
     def _get_states(self) -> None:
         if self.n_states:

@@ -197,6 +197,10 @@ def run(
                 status = fmi_status(call_vector(function, (a, b, n)))
             elif code == FMI2_COMPLETED:
                 status = fmi_status(call_completed(function, (a, 1, b, b + 4)))
+                t = t0 + (k + load_f8(w + 32)) * h
+                due = t + 1e-9 * h >= load_f8(load_i8(op + 40))
+                if status == 0 and (due or load_i4(b) + load_i4(b + 4) != 0):
+                    status = call_kernel(c, (0, t, h))
             elif code == FMI3_VALUES:
                 status = fmi_status(call_values3(function, (a, b, n, c, load_i8(op + 40))))
             elif code == FMI3_DO_STEP:

@@ -18,6 +18,7 @@ import numpy as np
 
 from .compiler import load, lower_function
 from .errors import SimulationError, TimeError, did_you_mean
+from .fmu import FMU
 from .opcodes import CALL, FMI2_VALUES, RECORD, TO_INT
 from .program import Program, steps_between
 from .result import Result, Statistics
@@ -132,7 +133,7 @@ def _ports(system: System, names: Iterable[str] | None) -> list[Port]:
         return [
             system.port(f"{name}.{port}", "output")
             for name, member in system.participants.items()
-            for port in outputs_of(member)
+            for port in (member.declared_outputs if isinstance(member, FMU) else outputs_of(member))
         ]
     return [_readable(system, name) for name in names]
 

@@ -16,7 +16,7 @@ FMI2_VALUES = 10  # get or set n values at c by value references b; with d > 0 t
 FMI2_DO_STEP = 11
 FMI2_TIME = 12
 FMI2_VECTOR = 13  # get or set the vector b of n floats (states, derivatives)
-FMI2_COMPLETED = 14  # b: two int32, "enter event mode" and "terminate"
+FMI2_COMPLETED = 14  # b: int32 flags "enter event mode", "terminate"; one set, or time d due, calls c
 FMI3_VALUES = 20  # as FMI2_VALUES; d is the number of values
 FMI3_DO_STEP = 21  # b: three flags and the last successful time
 

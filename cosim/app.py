@@ -1,0 +1,196 @@
+"""The command line: cosim list, run, table, export, inspect.
+
+The outermost layer: it alone may import scenarios, controllers and fmus, and does so
+when a command needs them. Options of a scenario are the keyword arguments of its
+functions; nothing is declared twice. An error of the user's ends with exit code 2 and
+a text of one screen, an interrupted run with 130.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import sys
+import typing
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from .errors import CosimError
+from .result import Result
+from .scenario import Scenario, load_scenario, scenario_names
+
+_app = App(
+    name="cosim", help="Co-simulation of vibration-controlled structures.", result_action="return_value"
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command and leave with its exit code."""
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        _dispatch(tokens)
+    except (CosimError, CycloptsError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+def _dispatch(tokens: list[str]) -> None:
+    """Call a command; `run` and `table` take their options from the scenario that they name."""
+    if len(tokens) > 1 and tokens[0] in ("run", "table") and not tokens[1].startswith("-"):
+        scenario = load_scenario(tokens[1])
+        app = App(name=f"cosim {tokens[0]} {scenario.name}", result_action="return_value")
+        app.default(_run_command(scenario) if tokens[0] == "run" else _table_command(scenario))
+        app(tokens[2:], exit_on_error=False, print_error=False)
+    else:
+        _app(tokens, exit_on_error=False, print_error=False)
+
+
+def _with_options(
+    function: Callable[..., Any], body: Callable[..., None], **more: Any
+) -> Callable[..., None]:
+    """Return `body` with the signature of `function` (less `progress`) and the options `more`."""
+
+    def command(**options: Any) -> None:
+        body(**options)
+
+    hints = typing.get_type_hints(function, include_extras=True)
+    own = [
+        p.replace(annotation=hints.get(n, str), kind=inspect.Parameter.KEYWORD_ONLY)
+        for n, p in inspect.signature(function).parameters.items()
+        if n != "progress"
+    ]
+    added = [
+        inspect.Parameter(n, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for n, (annotation, default) in more.items()
+    ]
+    command.__doc__ = function.__doc__
+    command.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
+    return command
+
+
+# ---------------------------------------------------------------------------- commands
+
+
+@_app.command(name="list")
+def list_scenarios() -> None:
+    """List the scenarios."""
+    from .scenario import summary
+
+    names = scenario_names()
+    width = max(map(len, names), default=0)
+    for name in names:
+        print(f"{name:<{width}}  {summary(name)}")
+
+
+@_app.command
+def run(scenario: str) -> None:
+    """Run a scenario, or a file of yours like one; `cosim run NAME --help` lists its options."""
+
+
+@_app.command
+def table(scenario: str) -> None:
+    """Print the table of a scenario, printed beside computed; `cosim table NAME --help` for options."""
+
+
+def _run_command(scenario: Scenario) -> Callable[..., None]:
+    out_type = Annotated[Path | None, Parameter(help="folder for metrics, result and figures [out/NAME]")]
+    figures_type = Annotated[bool, Parameter(help="draw the figures")]
+
+    def body(out: Path | None, figures: bool, **options: Any) -> None:
+        from .run_directory import write_run
+
+        directory = out or Path("out") / scenario.name
+        result = _with_progress(
+            scenario.run, options, lambda part: write_run(directory, scenario, options, part)
+        )
+        for line in write_run(directory, scenario, options, result, figures=figures):
+            print(line)
+
+    return _with_options(scenario.run, body, out=(out_type, None), figures=(figures_type, True))
+
+
+def _table_command(scenario: Scenario) -> Callable[..., None]:
+    json_type = Annotated[bool, Parameter(help="print the rows as JSON")]
+
+    def body(json: bool, **options: Any) -> None:
+        rows = _with_progress(scenario.function("table"), options, lambda part: None)
+        print(_as_json(rows) if json else scenario.table_text(rows))
+
+    return _with_options(scenario.function("table"), body, json=(json_type, False))
+
+
+def _as_json(rows: Any) -> str:
+    return json.dumps(rows, indent=1, default=float)
+
+
+def _with_progress(
+    function: Callable[..., Any], options: dict[str, Any], keep: Callable[[Result], Any]
+) -> Any:
+    """Call a function of a scenario, with a progress bar if it takes one; keep an unfinished result."""
+    from .errors import SimulationError
+    from .master import Interrupted
+
+    try:
+        if "progress" not in inspect.signature(function).parameters:
+            return function(**options)
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+        columns = [TextColumn("{task.completed}/{task.total}"), BarColumn(), TimeElapsedColumn()]
+        with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("", total=None)
+            return function(**options, progress=lambda k, n: bar.update(task, completed=k, total=n))
+    except (SimulationError, Interrupted) as error:
+        if error.result is not None:
+            keep(error.result)
+        raise
+
+
+@_app.command
+def export(
+    participant: str,
+    *,
+    out: Path | None = None,
+    platform: tuple[str, ...] = (),
+    fmi_version: str = "2.0",
+) -> None:
+    """Export a participant of a scenario as a native FMU.
+
+    Parameters
+    ----------
+    participant
+        scenario:participant, such as chattering:plant or my_scenario.py:controller
+    out
+        the file to write [PARTICIPANT.fmu]
+    platform
+        x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, aarch64-darwin; may be repeated
+        [this machine]
+    fmi_version
+        2.0
+    """
+    from fmus.export import export as export_fmu
+
+    from .scenario import find_participant
+
+    member = find_participant(participant)
+    path = out or Path(f"{participant.rpartition(':')[2]}.fmu")
+    export_fmu(member, path, platforms=list(platform) or None, fmi_version=fmi_version)
+    print(f"{path} ({path.stat().st_size / 1024:.0f} KB)")
+
+
+@_app.command(name="inspect")
+def inspect_fmu(fmu: Path) -> None:
+    """Show what an FMU is: capabilities, default experiment, variables with units and start values."""
+    from .inspection import inspection
+
+    print(inspection(fmu))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,61 @@
+"""What a run leaves on disk: metrics.json, result.npz, figures as PNG and SVG."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from .result import Result
+from .scenario import Scenario
+
+_TOOLS = ("structcosim", "fmpy", "numpy", "scipy", "numba", "llvmlite", "matplotlib")
+
+
+def write_run(
+    directory: Path, scenario: Scenario, options: dict[str, Any], result: Result, figures: bool = False
+) -> list[str]:
+    """Write a run to its folder; return lines that say what was found and where it is."""
+    directory.mkdir(parents=True, exist_ok=True)
+    metrics = scenario.metrics(result)
+    record = {
+        "scenario": scenario.name,
+        "command": " ".join(["cosim", *sys.argv[1:]]),
+        "options": {
+            n: v if isinstance(v, (int, float, str, bool, type(None))) else str(v) for n, v in options.items()
+        },
+        "seed": options.get("seed"),
+        "metrics": {n: {"value": float(v), "unit": unit} for n, (v, unit) in metrics.items()},
+        "steps": result.steps,
+        "step": {"value": result.step, "unit": "s"},
+        "loop": {"value": result.seconds, "unit": "s"},
+        "interrupted": result.interrupted,
+        "schedule": result.schedule.splitlines(),
+        "versions": {name: version(name) for name in _TOOLS} | {"python": platform.python_version()},
+    }
+    (directory / "metrics.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    result.save(directory / "result.npz")
+    names = _draw(directory / "figures", scenario, result) if figures else []
+    width = max(map(len, metrics), default=0)
+    lines = [f"{name:<{width}}  {value:12.6g}  {unit}".rstrip() for name, (value, unit) in metrics.items()]
+    drawn = f", {len(names)} figures" if names else ""
+    return [
+        *lines,
+        f"{result.steps} steps in {result.seconds:.3g} s; {directory}: metrics.json, result.npz{drawn}",
+    ]
+
+
+def _draw(directory: Path, scenario: Scenario, result: Result) -> list[str]:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    drawn = scenario.figures(result)
+    if drawn:
+        directory.mkdir(exist_ok=True)
+    for name, figure in drawn.items():
+        for ending in ("png", "svg"):
+            figure.savefig(directory / f"{name}.{ending}", dpi=130)
+    return list(drawn)
