@@ -1,0 +1,1 @@
+"""Structural plants, and the way from a participant to an .fmu file."""

@@ -1,0 +1,99 @@
+/* Snapshots: the record with mode and time, in one piece of memory whose bytes are also the
+   serialised form. Until initialisation ends the record is what was set (`settings`), so that
+   `initialize` runs again on the restored settings; afterwards it is the live record. Outputs and
+   derivatives are computed again after a restore. */
+
+#include "core.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct snapshot {
+    char token[64];
+    uint32_t interface, mode;
+    double t, start_time, stop_time, step;
+    double record[];
+};
+
+#define BEFORE_RUNNING (INSTANTIATED | PREPARED | INITIALIZING)
+
+size_t core_serialized_size(void) { return sizeof(struct snapshot) + model.n_slots * sizeof(double); }
+
+static status check(struct instance *c, const struct snapshot *s, const char *function) {
+    unsigned alone = s->mode & (BEFORE_RUNNING | EVENT | CONTINUOUS_TIME | STEPPING | TERMINATED | BROKEN);
+    unsigned other = s->interface == MODEL_EXCHANGE ? STEPPING : EVENT | CONTINUOUS_TIME;
+    if (memcmp(s->token, model.token, strlen(model.token) + 1))
+        return core_refuse(c, function, "the state is not one of %s, or is damaged", model.identifier);
+    if (s->interface != c->interface)
+        return core_refuse(c, function, "the state is one of the other interface (ME or CS)");
+    if (alone != s->mode || !alone || (alone & (alone - 1)) || (alone & other) || !isfinite(s->t) ||
+        !isfinite(s->start_time) || isnan(s->stop_time))
+        return core_refuse(c, function, "the state is damaged");
+    return OK;
+}
+
+status core_snapshot(struct instance *c, void **snapshot, const char *function) {
+    if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
+    struct snapshot *s = *snapshot ? *snapshot : calloc(1, core_serialized_size());
+    if (!s) return core_refuse(c, function, "out of memory");
+    strncpy(s->token, model.token, sizeof s->token - 1);
+    s->interface = c->interface;
+    s->mode = c->mode;
+    s->t = c->t;
+    s->start_time = c->start_time;
+    s->stop_time = c->stop_time;
+    s->step = c->step;
+    memcpy(s->record, c->mode & BEFORE_RUNNING ? c->settings : c->record, model.n_slots * sizeof(double));
+    *snapshot = s;
+    return OK;
+}
+
+status core_restore(struct instance *c, const void *snapshot, const char *function) {
+    if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
+    const struct snapshot *s = snapshot;
+    if (check(c, s, function)) return FAILED;
+    c->mode = (enum mode)s->mode;
+    c->t = s->t;
+    c->start_time = s->start_time;
+    c->stop_time = s->stop_time;
+    c->step = s->step;
+    c->stale = true;
+    memcpy(c->mode & BEFORE_RUNNING ? c->settings : c->record, s->record, model.n_slots * sizeof(double));
+    return OK;
+}
+
+void core_forget(void **snapshot) {
+    free(*snapshot);
+    *snapshot = NULL;
+}
+
+status core_serialize(struct instance *c, const void *snapshot, unsigned char *bytes, size_t size,
+                      const char *function) {
+    if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
+    if (core_need(c, bytes, 1, "serializedState", function)) return FAILED;
+    if (size < core_serialized_size())
+        return core_refuse(c, function, "%zu bytes for a state of %zu", size, core_serialized_size());
+    memcpy(bytes, snapshot, core_serialized_size());
+    return OK;
+}
+
+status core_deserialize(struct instance *c, const unsigned char *bytes, size_t size, void **snapshot,
+                        const char *function) {
+    if (core_need(c, bytes, 1, "serializedState", function)) return FAILED;
+    if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
+    if (size != core_serialized_size())
+        return core_refuse(c, function, "%zu bytes for a state of %zu", size, core_serialized_size());
+    struct snapshot *s = malloc(size);
+    if (!s) return core_refuse(c, function, "out of memory");
+    memcpy(s, bytes, size); /* bytes of the host need not be aligned */
+    if (check(c, s, function)) {
+        free(s);
+        return FAILED;
+    }
+    if (*snapshot) { /* as in core_snapshot: the host may hand in an old one */
+        memcpy(*snapshot, s, size);
+        free(s);
+    } else *snapshot = s;
+    return OK;
+}

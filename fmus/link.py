@@ -1,0 +1,262 @@
+"""From kernels in LLVM IR to a shared library: `python -m ziglang cc` and a cache.
+
+A library is linked from the kernels of a participant (`cosim.compiler.lower`), the
+front end in fmus/c and one generated C file, the model's table. The C compiler comes
+with the package `ziglang` and links for every platform of `PLATFORMS` from any machine;
+its CPU level is the lowest of each, the C library the oldest that is worth it, so that
+what was linked here runs there. A library is cached by a hash of all that went into it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import importlib.util
+import json
+import math
+import os
+import platform as host_platform
+import re
+import subprocess
+import sys
+import tempfile
+import uuid
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import llvmlite.binding as llvm
+
+from cosim.compiler import LIBM, cache_directory, write_atomically
+from cosim.errors import CosimError
+from cosim.participant import Participant
+from cosim.variables import KINDS, Variable
+
+KERNELS = ("initialize", "derivatives", "outputs", "advance", "step")
+_FRONT_END = Path(__file__).parent / "c"
+_SHARED_SOURCES = ("core.c", "snapshot.c", "sensitivity.c")
+_FLAGS = (
+    *("-std=c23", "-O2", "-Wall", "-Wextra", "-Wno-override-module", "-g0", "-s"),
+    *("-shared", "-fPIC", "-fvisibility=hidden", "-fno-sanitize=all"),
+)
+_REMEDIES = {
+    "NRT_": "the kernel allocates an array; write into a declared Local instead",
+    "Py": "the kernel needs the Python runtime (an exception, a string, a Python object)",
+    "numba_": "the kernel needs Numba's runtime",
+}
+
+
+class ExportError(CosimError):
+    """A participant that cannot leave as an FMU, or a library that cannot be linked."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """Where a library runs: its name here and in FMI 3.0, the linker's target, FMI 2.0's folder."""
+
+    name: str
+    target: str
+    fmi2_folder: str
+    suffix: str
+
+
+#: FMI 2.0 has one folder per system: see `folders` in fmus/export.py for two architectures at once.
+PLATFORMS = {
+    p.name: p
+    for p in (
+        Platform("x86_64-linux", "x86_64-linux-gnu.2.17", "linux64", ".so"),
+        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "linux64", ".so"),
+        Platform("x86_64-windows", "x86_64-windows-gnu", "win64", ".dll"),
+        Platform("x86_64-darwin", "x86_64-macos.11.0", "darwin64", ".dylib"),
+        Platform("aarch64-darwin", "aarch64-macos.11.0", "darwin64", ".dylib"),
+    )
+}
+
+
+def host() -> str:
+    """Return the name of the platform that this runs on."""
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(m := host_platform.machine().lower(), m)
+    return f"{machine}-{host_platform.system().lower()}"
+
+
+def find_platform(name: str) -> Platform:
+    """Return the platform of that name, or say which there are."""
+    if name not in PLATFORMS:
+        raise ExportError(f"no platform '{name}'; choose from {', '.join(PLATFORMS)}")
+    return PLATFORMS[name]
+
+
+@dataclass(frozen=True)
+class Model:
+    """All that a library is made of, apart from the platform and the front end."""
+
+    identifier: str
+    fmi_version: str
+    kernels: str
+    table: str
+    start: bytes
+    token: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        parts = (self.identifier, self.fmi_version, self.kernels, self.table, front_end(self.fmi_version))
+        digest = hashlib.sha256(self.start + "\0".join(parts).encode()).digest()
+        object.__setattr__(self, "token", str(uuid.UUID(bytes=digest[:16], version=5)))
+
+
+def front_end(fmi_version: str) -> str:
+    """Return the front end's text: part of what makes one export different from another."""
+    return "".join(p.name + p.read_text() for p in [*_sources(fmi_version), *sorted(_FRONT_END.glob("*.h"))])
+
+
+def _sources(fmi_version: str) -> list[Path]:
+    return [_FRONT_END / name for name in (*_SHARED_SOURCES, f"fmi{fmi_version[0]}.c")]
+
+
+def build_model(participant: Participant, identifier: str, fmi_version: str, kernels: str) -> Model:
+    """Return the model of a participant whose kernels have been lowered to `kernels`."""
+    check_symbols(kernels, identifier)
+    start = participant.memory.astype("<f8").tobytes()
+    return Model(identifier, fmi_version, kernels, _table(participant, identifier), start)
+
+
+# ------------------------------------------------------------------------ symbols
+
+
+def check_symbols(ir: str, identifier: str) -> None:
+    """Refuse IR that needs more than libm, naming the symbol and the kernels that need it."""
+    needed = set(re.findall(r'^declare\b[^@\n]*@"?([^"(\s]+)"?\(', ir, re.MULTILINE))
+    for symbol in sorted(needed):
+        if symbol.startswith("llvm.") or symbol in LIBM:
+            continue
+        kernels = [name for name in KERNELS if symbol in reachable(ir, name)]
+        why = next((text for start, text in _REMEDIES.items() if symbol.startswith(start)), None)
+        raise ExportError(
+            f"{identifier}: kernel {' and '.join(kernels) or '?'} needs '{symbol}', which no FMU has: "
+            + (why or "call only functions of libm and of cosim.functions")
+        )
+
+
+def reachable(ir: str, kernel: str) -> dict[str, str]:
+    """Return the functions that a kernel calls, directly or not, and itself, with their IR."""
+    bodies = {m[1]: m[0] for m in re.finditer(r'^define\b[^@\n]*@"?([^"(\s]+)"?\(.*?^}', ir, re.M | re.S)}
+    reached: dict[str, str] = {}
+    waiting = [f"kernel_{kernel}"]
+    while waiting:
+        name = waiting.pop()
+        reached[name] = bodies.get(name, "")
+        waiting += {n for n in re.findall(r'@"?([^"(\s,)]+)"?', reached[name]) if n not in reached}
+    return reached
+
+
+def _hidden(ir: str) -> str:
+    """Keep the kernels out of the library's symbol table, and the build machine's CPU out of its code."""
+    module = llvm.parse_assembly(ir)
+    for function in module.functions:
+        if function.name.startswith("kernel_"):
+            function.visibility = "hidden"
+    return re.sub(r' ?"(target-cpu|target-features|tune-cpu)"="[^"]*"', "", str(module))
+
+
+# -------------------------------------------------------------------------- table
+
+
+def _table(participant: Participant, identifier: str) -> str:
+    """Return the C file that defines `model`, but for its token."""
+    variables = list(participant.variables.values())
+    shapes, rows = [], []
+    for i, v in enumerate(variables):
+        shape = ", ".join(str(n) for n in v.shape)
+        if shape:
+            shapes.append(f"static const uint32_t shape_{i}[] = {{{shape}}};")
+        fields = [json.dumps(fmi_name(v)), f"shape_{i}" if shape else "NULL", len(v.shape), v.slot, v.size]
+        fields += [v.kind.upper(), "true" if is_listed(v) else "false", _number(v.min), _number(v.max)]
+        rows.append(f"    {{{', '.join(map(str, fields))}}},")
+    have = [name for name in KERNELS if name in participant.kernels]
+    zones = [participant.zones[kind][0] for kind in KINDS] + [sum(participant.zones[KINDS[-1]])]
+    return "\n".join(
+        [
+            '#include "model.h"\n\n#include <math.h>\n',
+            *(f"extern model_kernel kernel_{name};" for name in have),
+            'static const unsigned char start[] __attribute__((aligned(64))) = {\n#embed "start.bin"\n};',
+            *shapes,
+            "static const struct variable variables[] = {",
+            *rows,
+            "};\nconst struct model model = {",
+            f"    .identifier = {json.dumps(identifier)},\n    .token = MODEL_TOKEN,",
+            f"    .n_slots = {participant.memory.size},\n    .zone = {{{', '.join(map(str, zones))}}},",
+            f"    .variables = variables,\n    .n_variables = {len(variables)},\n    .start = start,",
+            *(f"    .{name} = kernel_{name}," for name in have),
+            "};\n",
+        ]
+    )
+
+
+def _number(x: float) -> str:
+    if math.isinf(x):
+        return "INFINITY" if x > 0 else "-INFINITY"
+    return float(x).hex()
+
+
+def is_listed(v: Variable) -> bool:
+    """Tell whether a variable stands in the modelDescription."""
+    return v.kind != "local" and not v.fixed
+
+
+def fmi_name(v: Variable) -> str:
+    """Return the name in the modelDescription, without indices: der_x is der(x) there."""
+    return f"der({v.name.removeprefix('der_')})" if v.kind == "derivative" else v.name
+
+
+# --------------------------------------------------------------------------- link
+
+
+def link(model: Model, platform: Platform) -> bytes:
+    """Return the shared library of a model for a platform, from the cache if it has been linked before."""
+    if importlib.util.find_spec("ziglang") is None:
+        raise ExportError("no C compiler: the package ziglang is not installed; pip install ziglang")
+    headers = _fmi_headers()
+    ir = _hidden(model.kernels)
+    parts: list[str] = [platform.target, *_FLAGS, model.token, ir, importlib.metadata.version("ziglang")]
+    parts += [p.read_text() for p in sorted(headers.glob(f"fmi{model.fmi_version[0]}*.h"))]
+    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    cached = cache_directory() / "libraries" / f"{key}{platform.suffix}"
+    if not cached.exists():
+        write_atomically(cached, _compile(model, platform, ir, headers))
+    return cached.read_bytes()
+
+
+def _compile(model: Model, platform: Platform, ir: str, headers: Path) -> bytes:
+    cache = cache_directory()
+    with tempfile.TemporaryDirectory(dir=cache) as name:
+        folder = Path(name)
+        (folder / "kernels.ll").write_text(ir)
+        (folder / "start.bin").write_bytes(model.start)
+        (folder / "model.c").write_text(f'#define MODEL_TOKEN "{model.token}"\n{model.table}')
+        library = folder / f"{model.identifier}{platform.suffix}"
+        arguments: list[str | Path] = ["-target", platform.target, *_FLAGS]
+        arguments += [f"-I{headers}", f"-I{_FRONT_END}", f"--embed-dir={folder}"]
+        arguments += [] if platform.suffix == ".dll" else ["-lm"]
+        arguments += [folder / "model.c", folder / "kernels.ll", *_sources(model.fmi_version), "-o", library]
+        zig = str(cache / "zig")
+        environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig}
+        done = subprocess.run(
+            [sys.executable, "-m", "ziglang", "cc", *map(str, arguments)],
+            capture_output=True, text=True, env=environment, cwd=folder, check=False,
+        )  # fmt: skip
+        if done.returncode or not library.exists():
+            raise ExportError(_explain(model.identifier, platform, done.stderr))
+        return library.read_bytes()
+
+
+def _explain(identifier: str, platform: Platform, stderr: str) -> str:
+    lines = [line.strip() for line in stderr.splitlines() if "error" in line or "undefined symbol" in line]
+    said = "; ".join(lines[:4]) or stderr.strip()[-400:] or "the compiler said nothing"
+    return f"{identifier} cannot be linked for {platform.name}: {said}"
+
+
+def _fmi_headers() -> Path:
+    """Return the folder of the FMI headers: FMPy carries them."""
+    spec = importlib.util.find_spec("fmpy")
+    folder = Path(spec.origin).parent / "c-code" if spec and spec.origin else Path("c-code")
+    if not (folder / "fmi2Functions.h").exists():
+        raise ExportError("the FMI headers are missing: they come with the package fmpy; pip install fmpy")
+    return folder
