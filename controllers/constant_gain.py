@@ -1,0 +1,24 @@
+"""Sliding mode control with a constant gain (thesis 4.1, eq. 4.4).
+
+    u = -M sgn(s)                                                 (4.4)
+
+Chapter 4 takes M = 100 in cases 1 and 2, and M = 300 in cases 3 to 6.
+"""
+
+from cosim import Block, Input, Output, Parameter
+from cosim.functions import sign
+
+
+class ConstantGain(Block):
+    """u = -M_0 sgn(s), (4.4); the output M is M_0, as with the other gain laws."""
+
+    M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
+    s = Input("sliding variable")
+    u = Output("control force", unit="N")
+    M = Output("gain in use", unit="N")
+    sgn = Output("sign of s", unit="1")
+
+    def step(self, t: float, h: float) -> None:
+        self.sgn = sign(self.s)
+        self.M = self.M_0
+        self.u = -self.M * self.sgn  # (4.4)

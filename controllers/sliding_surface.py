@@ -1,0 +1,20 @@
+"""Sliding surface of chapter 4 (thesis 4.1): s = x2 + a x1.
+
+    s' = x2' + a x2                                               (4.3)
+
+On s = 0 the state decays: x1' = -a x1, so x1 = e^(-a t) x1(0).
+"""
+
+from cosim import Block, Input, Output, Parameter
+
+
+class SlidingSurface(Block):
+    """s = x2 + a x1, of displacement x1 and velocity x2 at the same instant."""
+
+    a = Parameter(1.0, "rate of decay on the surface", unit="1/s", min=0.0)
+    x1 = Input("displacement", unit="m")
+    x2 = Input("velocity", unit="m/s")
+    s = Output("sliding variable", unit="m/s")
+
+    def step(self, t: float, h: float) -> None:
+        self.s = self.x2 + self.a * self.x1

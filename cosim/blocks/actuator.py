@@ -1,0 +1,59 @@
+"""Actuators: a limit on the force, and a first-order lag behind it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from ..functions import clip
+from ..participant import Block, Continuous
+from ..variables import Array, Input, Output, Parameter, State
+from .ports import length, set_unit
+
+
+class Saturation(Block):
+    """y = u limited to [-limit, limit]"""
+
+    limit = Parameter(1.0, "largest magnitude", shape="n", min=0.0)
+    u = Input("command", shape="n")
+    y = Output("limited command", shape="n")
+
+    def __init__(self, limit: ArrayLike, *, n: int | None = None, unit: str | None = "N") -> None:
+        super().__init__(limit=limit, n=length("Saturation", n, limit))
+        set_unit(self, unit, "limit", "u", "y")
+
+    def step(self, t: float, h: float) -> None:
+        for i in range(self.y.shape[0]):
+            self.y[i] = clip(self.u[i], -self.limit[i], self.limit[i])
+
+
+class FirstOrderActuator(Continuous):
+    """tau F' + F = u limited to [-limit, limit]
+
+    With |F(0)| <= limit the force never exceeds the limit: it approaches a limited
+    command. Exact for a command held over a step:
+
+        F(t + h) = F(t) + (1 - e^(-h / tau)) (sat u - F(t))
+    """
+
+    tau = Parameter(0.01, "time constant", unit="s", min=1e-12)
+    limit = Parameter(1.0, "largest force", unit="N", shape="n", min=0.0)
+    u = Input("command", unit="N", shape="n")
+    F = State(0.0, "force", unit="N", shape="n")
+
+    if TYPE_CHECKING:
+        der_F: Array
+
+    def __init__(self, tau: float, limit: ArrayLike = math.inf, *, n: int | None = None) -> None:
+        super().__init__(tau=tau, limit=limit, n=length("FirstOrderActuator", n, limit))
+
+    def derivatives(self, t: float) -> None:
+        for i in range(self.F.shape[0]):
+            self.der_F[i] = (clip(self.u[i], -self.limit[i], self.limit[i]) - self.F[i]) / self.tau
+
+    def advance(self, t: float, h: float) -> None:
+        approach = -math.expm1(-h / self.tau)
+        for i in range(self.F.shape[0]):
+            self.F[i] += approach * (clip(self.u[i], -self.limit[i], self.limit[i]) - self.F[i])

@@ -1,0 +1,56 @@
+"""Analogue-to-digital conversion: a finite range in finite steps."""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import ArrayLike
+
+from ..functions import clip
+from ..participant import Block
+from ..variables import Input, Output, Parameter
+from .ports import length, set_unit, whole
+
+
+class AnalogToDigital(Block):
+    """Quantisation to 2^bits levels in two's complement, saturated at the range.
+
+        q = full_scale / 2^(bits-1)
+        c = floor(u / q + 1/2) limited to [-2^(bits-1), 2^(bits-1) - 1]
+        y = q c
+
+    The error is at most q/2 for -full_scale - q/2 <= u < full_scale - q/2: the highest
+    level is one q below full scale.
+    """
+
+    full_scale = Parameter(1.0, "range is [-full_scale, full_scale)", shape="n", min=1e-300)
+    bits = Parameter(16.0, "number of bits", min=1.0, max=52.0)
+    u = Input("analogue signal", shape="n")
+    y = Output("quantised signal", shape="n")
+
+    def __init__(
+        self,
+        full_scale: ArrayLike,
+        *,
+        bits: int = 16,
+        n: int | None = None,
+        unit: str | None = None,
+        every: int | None = None,
+        sample_period: float | None = None,
+    ) -> None:
+        where = "AnalogToDigital"
+        super().__init__(
+            every=every,
+            sample_period=sample_period,
+            full_scale=full_scale,
+            bits=whole(bits, f"{where}: bits", 1, 52),
+            n=length(where, n, full_scale),
+        )
+        set_unit(self, unit, "u", "y", "full_scale")
+
+    def step(self, t: float, h: float) -> None:
+        levels = 2.0 ** (self.bits - 1.0)
+        for i in range(self.y.shape[0]):
+            q = self.full_scale[i] / levels
+            code = clip(self.u[i] / q, -levels, levels)  # first, so that floor gets a number it can hold
+            self.y[i] = q * clip(math.floor(code + 0.5) * 1.0, -levels, levels - 1.0)

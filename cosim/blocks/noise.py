@@ -1,0 +1,52 @@
+"""Measurement noise: a signal is sampled, and every sample carries its own error."""
+
+from __future__ import annotations
+
+import math
+
+from numpy.typing import ArrayLike
+
+from ..participant import Block
+from ..variables import Input, Local, Output, Parameter
+from .ports import length, set_unit, whole
+from .random_stream import normal, seed_streams
+
+
+class MeasurementNoise(Block):
+    """y_k = u_k + sigma N_k at every sample_period, held in between; N_k standard normal.
+
+    The numbers depend on `seed` and the element alone (random_stream.py). A sensor
+    whose noise is to be independent of another's takes another seed.
+    """
+
+    sigma = Parameter(1.0, "standard deviation", shape="n", min=0.0)
+    seed = Parameter(1.0, "seed, a whole number", min=0.0, max=2.0**53)
+    u = Input("true signal", shape="n")
+    y = Output("measured signal", shape="n")
+    streams = Local(0.0, "state of the generators", shape=("n", 6))
+    work = Local(0.0, "working memory of the seeding", shape=(3, 3, 3))
+
+    def __init__(
+        self,
+        sigma: ArrayLike,
+        *,
+        sample_period: float,
+        seed: int = 1,
+        n: int | None = None,
+        unit: str | None = None,
+    ) -> None:
+        where = "MeasurementNoise"
+        super().__init__(
+            sample_period=sample_period,
+            sigma=sigma,
+            seed=whole(seed, f"{where}: seed", 0),
+            n=length(where, n, sigma),
+        )
+        set_unit(self, unit, "u", "y", "sigma")
+
+    def initialize(self) -> None:
+        seed_streams(math.floor(self.seed) * 1.0, self.streams, self.work)
+
+    def step(self, t: float, h: float) -> None:
+        for i in range(self.y.shape[0]):
+            self.y[i] = self.u[i] + self.sigma[i] * normal(self.streams[i])

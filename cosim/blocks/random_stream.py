@@ -1,0 +1,138 @@
+"""Random numbers for kernels: L'Ecuyer's combined generator MRG32k3a and its streams.
+
+    p_k = (1403580 p_{k-2} - 810728 p_{k-3}) mod m1,   m1 = 2^32 - 209
+    q_k = (527612 q_{k-1} - 1370589 q_{k-3}) mod m2,   m2 = 2^32 - 22853
+    U_k = ((p_k - q_k) mod m1) / (m1 + 1), with m1 in place of a remainder of 0; 0 < U_k < 1
+
+Every product is below 2^53, so float64 arithmetic is exact and a kernel interpreted,
+compiled or exported gives the same bits (L'Ecuyer 1999, "Good parameters and
+implementations for combined multiple recursive random number generators").
+
+The generator starts at the state (12345, ..., 12345). Seed number `seed` begins
+2^127 seed numbers later, stream i of a seed 2^76 i after that (L'Ecuyer, Simard, Chen
+and Kelton 2002, the streams and substreams of their package): two seeds, and two
+streams of a seed, never share a number in any run that can be finished.
+
+Normal numbers by Box and Muller, two uniform ones for each:
+
+    N = sqrt(-2 ln U_1) cos(2 pi U_2)
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..functions import assign
+from ..variables import Array
+
+M1 = 4294967087.0
+M2 = 4294944443.0
+
+#: three steps of the state ahead by 2^127 and 2^76 numbers, A^(2^127) mod m and A^(2^76) mod m
+A1_127 = np.array(
+    [
+        [2427906178.0, 3580155704.0, 949770784.0],
+        [226153695.0, 1230515664.0, 3580155704.0],
+        [1988835001.0, 986791581.0, 1230515664.0],
+    ]
+)
+A2_127 = np.array(
+    [
+        [1464411153.0, 277697599.0, 1610723613.0],
+        [32183930.0, 1464411153.0, 1022607788.0],
+        [2824425944.0, 32183930.0, 2093834863.0],
+    ]
+)
+A1_76 = np.array(
+    [
+        [82758667.0, 1871391091.0, 4127413238.0],
+        [3672831523.0, 69195019.0, 1871391091.0],
+        [3672091415.0, 3528743235.0, 69195019.0],
+    ]
+)
+A2_76 = np.array(
+    [
+        [1511326704.0, 3759209742.0, 1610795712.0],
+        [4292754251.0, 1511326704.0, 3889917532.0],
+        [3859662829.0, 4292754251.0, 3708466080.0],
+    ]
+)
+
+
+def remainder(v: float, m: float) -> float:
+    """Return v mod m in [0, m), exact for whole numbers |v| < 2^53."""
+    v -= math.floor(v / m) * m
+    if v < 0.0:  # the quotient was rounded up to a whole number
+        v += m
+    return v
+
+
+def multiply_add(a: float, b: float, c: float, m: float) -> float:
+    """Return (a b + c) mod m, exact for whole numbers in [0, 2^32): a in two parts of 17 bits."""
+    high = math.floor(a / 131072.0)
+    low = a - high * 131072.0
+    return remainder(remainder(high * b, m) * 131072.0 + low * b + c, m)
+
+
+def advance_state(A: Array, x: Array, y: Array, m: float) -> None:
+    """x = A x mod m; y is working memory, both (3,)."""
+    assign(x, y)
+    for i in range(3):
+        total = 0.0
+        for j in range(3):
+            total = multiply_add(A[i, j], y[j], total, m)
+        x[i] = total
+
+
+def power_of_state(A: Array, power: float, x: Array, work: Array, m: float) -> None:
+    """x = A^power x mod m by repeated squaring; work (3, 3, 3)."""
+    for i in range(3):
+        assign(A[i], work[0, i])
+    while power >= 1.0:
+        half = math.floor(power / 2.0)
+        if power - 2.0 * half == 1.0:
+            advance_state(work[0], x, work[2, 0], m)
+        power = half * 1.0
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for k in range(3):
+                    total = multiply_add(work[0, i, k], work[0, k, j], total, m)
+                work[1, i, j] = total
+        for i in range(3):
+            assign(work[1, i], work[0, i])
+
+
+def seed_streams(seed: float, streams: Array, work: Array) -> None:
+    """Place every row of streams (n, 6) at the start of its stream; work (3, 3, 3)."""
+    for i in range(streams.shape[0]):
+        p, q = streams[i, 0:3], streams[i, 3:6]
+        if i == 0:
+            for j in range(6):
+                streams[0, j] = 12345.0
+            power_of_state(A1_127, seed, p, work, M1)
+            power_of_state(A2_127, seed, q, work, M2)
+        else:
+            assign(streams[i - 1], streams[i])
+            advance_state(A1_76, p, work[2, 0], M1)
+            advance_state(A2_76, q, work[2, 0], M2)
+
+
+def uniform(state: Array) -> float:
+    """Return the next number of a stream, in (0, 1); state (6,) is p_{k-3..k-1}, q_{k-3..k-1}."""
+    p = remainder(1403580.0 * state[1] - 810728.0 * state[0], M1)
+    state[0], state[1], state[2] = state[1], state[2], p
+    q = remainder(527612.0 * state[5] - 1370589.0 * state[3], M2)
+    state[3], state[4], state[5] = state[4], state[5], q
+    difference = p - q
+    if difference <= 0.0:
+        difference += M1
+    return difference * 2.328306549295727688e-10  # 1 / (m1 + 1)
+
+
+def normal(state: Array) -> float:
+    """Return the next standard normal number of a stream."""
+    radius = math.sqrt(-2.0 * math.log(uniform(state)))
+    return radius * math.cos(2.0 * math.pi * uniform(state))

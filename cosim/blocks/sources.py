@@ -1,0 +1,188 @@
+"""Signal sources: constant, record, function of time, white noise."""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import DeclarationError, did_you_mean
+from ..participant import Block
+from ..records import Record
+from ..variables import Local, Output, Parameter
+from .ports import length, set_unit, whole
+from .random_stream import normal, seed_streams
+
+
+class Constant(Block):
+    """y = value, for a number or a vector."""
+
+    value = Parameter(0.0, "value", shape="n")
+    y = Output("signal", shape="n")
+
+    def __init__(self, value: ArrayLike = 0.0, *, unit: str | None = None) -> None:
+        given = np.atleast_1d(np.asarray(value, dtype=np.float64))
+        super().__init__(value=given, y=given)
+        set_unit(self, unit, "value", "y")
+
+    def step(self, t: float, h: float) -> None:
+        for i in range(self.y.shape[0]):
+            self.y[i] = self.value[i]
+
+
+class RecordSource(Block):
+    """A record as a signal: values v_0 .. v_{n-1} at start + i dt, zero outside.
+
+        q = (t - start) / dt,  i = floor q
+        hold:    y = scale v_i                                  0 <= q < n
+        linear:  y = scale (v_i + (q - i) (v_{i+1} - v_i))      0 <= q <= n - 1
+
+    q within 1e-12 of a whole number (relative above 1) is that number: t = k h and
+    i dt are then the same instant, rounded differently. So values at grid points are
+    the record's own, bit for bit, over any length.
+    """
+
+    values = Parameter(0.0, "values", shape="n_values", fixed=True)
+    dt = Parameter(0.01, "sample interval of the record", unit="s", min=1e-12, fixed=True)
+    start = Parameter(0.0, "time of the first value", unit="s")
+    scale = Parameter(1.0, "factor on the record")
+    linear = Parameter(1.0, "1: linear interpolation, 0: hold", min=0.0, max=1.0, fixed=True)
+    y = Output("signal")
+
+    def __init__(
+        self,
+        record: Record | ArrayLike,
+        dt: float | None = None,
+        *,
+        interpolation: Literal["linear", "hold"] = "linear",
+        scale: float = 1.0,
+        start: float | None = None,
+        unit: str | None = None,
+        every: int | None = None,
+        sample_period: float | None = None,
+    ) -> None:
+        """Take a Record (its dt, unit and start), or values with dt and unit."""
+        if interpolation not in ("linear", "hold"):
+            hint = did_you_mean(str(interpolation), ["linear", "hold"])
+            raise DeclarationError(f"RecordSource: interpolation '{interpolation}' is not known{hint}")
+        if isinstance(record, Record):
+            if dt is not None:
+                raise DeclarationError(
+                    f"RecordSource: record '{record.name}' has its own dt = {record.dt:g} s; "
+                    "leave dt out, or use record.resample(dt)"
+                )
+            values, dt, unit = record.values, record.dt, unit or record.unit
+            start = record.start if start is None else start
+        else:
+            values = np.asarray(record, dtype=np.float64)
+        if dt is None:
+            raise DeclarationError("RecordSource: values without dt; give the sample interval in s")
+        super().__init__(
+            every=every,
+            sample_period=sample_period,
+            values=values,
+            dt=dt,
+            start=start or 0.0,
+            scale=scale,
+            linear=float(interpolation == "linear"),
+        )
+        set_unit(self, unit, "y")
+
+    def step(self, t: float, h: float) -> None:
+        n = self.values.shape[0]
+        q = (t - self.start) / self.dt
+        self.y = 0.0
+        if -1.0 < q < n + 1.0:
+            nearest = math.floor(q + 0.5)
+            if abs(q - nearest) <= 1e-12 * max(1.0, abs(q)):
+                q = nearest * 1.0
+            i = math.floor(q)
+            if 0 <= i < n:
+                if q == i or self.linear == 0.0:
+                    self.y = self.scale * self.values[i]
+                elif i < n - 1:
+                    v = self.values[i]
+                    self.y = self.scale * (v + (q - i) * (self.values[i + 1] - v))
+
+
+def f(t: float) -> float:
+    """Stand for the function of a `function_source`; each has its own in this place."""
+    return t
+
+
+class _FunctionOfTime(Block):
+    """y = f(t)"""
+
+    y = Output("signal")
+
+    def step(self, t: float, h: float) -> None:
+        self.y = f(t)
+
+
+def function_source(
+    function: Callable[[float], float],
+    *,
+    unit: str | None = None,
+    every: int | None = None,
+    sample_period: float | None = None,
+) -> Block:
+    """Return a block with y = function(t), for any function of time in s that gives a number.
+
+        function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s2")
+
+    A function in Numba's subset is compiled with the block (closures over numbers
+    too); any other is called back, which the run says in a warning.
+    """
+    if not callable(function):
+        raise DeclarationError(f"function_source takes a function of time, got {function!r}")
+    template = _FunctionOfTime.step
+    step = types.FunctionType(template.__code__, {**template.__globals__, "f": function}, "step")
+    name = "FunctionSource"
+    made: Any = type(name, (Block,), {"y": Output("signal"), "step": step, "__doc__": "y = f(t)"})
+    block: Block = made(every=every, sample_period=sample_period)
+    set_unit(block, unit, "y")
+    return block
+
+
+class WhiteNoise(Block):
+    """Independent normal numbers, one every sample_period, held in between.
+
+        y_k = mean + sigma N_k,  N_k standard normal (random_stream.py)
+
+    The numbers depend on `seed` and the element alone: not on the communication step,
+    the coupling, the machine's random state, or on how many elements there are.
+    """
+
+    mean = Parameter(0.0, "mean", shape="n")
+    sigma = Parameter(1.0, "standard deviation", shape="n", min=0.0)
+    seed = Parameter(1.0, "seed, a whole number", min=0.0, max=2.0**53)
+    y = Output("noise", shape="n")
+    streams = Local(0.0, "state of the generators", shape=("n", 6))
+    work = Local(0.0, "working memory of the seeding", shape=(3, 3, 3))
+
+    def __init__(
+        self,
+        *,
+        sample_period: float,
+        seed: int = 1,
+        sigma: ArrayLike = 1.0,
+        mean: ArrayLike = 0.0,
+        n: int | None = None,
+        unit: str | None = None,
+    ) -> None:
+        """n elements: as many as sigma or mean have, otherwise 1."""
+        values: dict[str, Any] = {"sigma": sigma, "mean": mean, "seed": whole(seed, "WhiteNoise: seed", 0)}
+        values["n"] = length("WhiteNoise", n, sigma, mean)
+        super().__init__(sample_period=sample_period, **values)
+        set_unit(self, unit, "y", "sigma", "mean")
+
+    def initialize(self) -> None:
+        seed_streams(math.floor(self.seed) * 1.0, self.streams, self.work)
+
+    def step(self, t: float, h: float) -> None:
+        for i in range(self.y.shape[0]):
+            self.y[i] = self.mean[i] + self.sigma[i] * normal(self.streams[i])
