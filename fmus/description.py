@@ -12,7 +12,7 @@ locals and parameters that are fixed at export are not listed.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -62,7 +62,7 @@ def role(v: Variable, participant: Participant) -> Role:
     """Return causality, variability and initial: outputs and derivatives are calculated, others exact."""
     changes = "continuous" if isinstance(participant, Continuous) else "discrete"
     return {
-        "input": Role("input", changes, None, True),
+        "input": Role("input", "continuous", None, True),  # a block samples what may change at any time
         "output": Role("output", changes, "calculated", False),
         "state": Role("output", changes, "exact", True),
         "derivative": Role("local", "continuous", "calculated", False),
@@ -138,12 +138,10 @@ def unit_name(v: Variable) -> str | None:
     return f"{parse(v.unit):~C}".replace("**", "^").replace("dimensionless", "1")
 
 
-def _add_units(parent: etree._Element, listed: Iterable[Element]) -> None:
-    names = sorted({unit for e in listed if (unit := unit_name(e.variable)) is not None})
-    if not names:
-        return
-    definitions = etree.SubElement(parent, "UnitDefinitions")
-    for name in names:
+def _add_units(parent: etree._Element, names: Iterable[str | None]) -> None:
+    listed = sorted({name for name in names if name is not None})
+    definitions = etree.SubElement(parent, "UnitDefinitions") if listed else None
+    for name in listed:
         exponents, factor, offset = unit_definition(name)
         attributes = {k: str(n) for k, n in exponents.items() if n}
         if factor != 1.0:
@@ -185,7 +183,10 @@ def _common(participant: Participant, model: Model, interfaces: Iterable[str], t
     return root
 
 
-def _experiment(root: etree._Element, experiment: DefaultExperiment) -> None:
+def _log_and_experiment(root: etree._Element, experiment: DefaultExperiment) -> None:
+    categories = etree.SubElement(root, "LogCategories")
+    etree.SubElement(categories, "Category", name="logStatusError", description="refused calls and failures")
+    etree.SubElement(categories, "Category", name="logEvents", description="life of the instance")
     etree.SubElement(
         root,
         "DefaultExperiment",
@@ -230,41 +231,91 @@ def fmi2_description(
         if element.tag == "ModelExchange":
             element.set("completedIntegratorStepNotNeeded", "true")
     listed = elements(participant, arrays=False)
-    _add_units(root, listed)
-    categories = etree.SubElement(root, "LogCategories")
-    etree.SubElement(categories, "Category", name="logStatusError", description="refused calls and failures")
-    etree.SubElement(categories, "Category", name="logEvents", description="life of the instance")
-    _experiment(root, experiment)
+    _add_units(root, (unit_name(e.variable) for e in listed))
+    _log_and_experiment(root, experiment)
     index = {e.slot: i + 1 for i, e in enumerate(listed)}
     to_state = {d: s for s, d in structure.derivative_of.items()}
     variables = etree.SubElement(root, "ModelVariables")
     for e in listed:
         v = etree.SubElement(variables, "ScalarVariable", name=e.name, valueReference=str(e.slot))
-        if e.variable.meaning:
-            v.set("description", e.variable.meaning)
-        v.set("causality", e.role.causality)
-        v.set("variability", e.role.variability)
-        if e.role.initial is not None:
-            v.set("initial", e.role.initial)
+        _add_role(v, e)
         real = etree.SubElement(v, "Real", _bounds(e.variable))
         if e.role.has_start:
             real.set("start", _start(e, participant.memory))
         if e.slot in to_state:
             real.set("derivative", str(index[to_state[e.slot]]))
     tree = etree.SubElement(root, "ModelStructure")
-    outputs = [e.slot for e in listed if e.role.causality == "output"]
-    derivatives = [e.slot for e in listed if e.variable.kind == "derivative"]
-    calculated = [e.slot for e in listed if e.role.initial == "calculated"]
-    for tag, slots, known in (
-        ("Outputs", outputs, structure.running),
-        ("Derivatives", derivatives, structure.running),
-        ("InitialUnknowns", calculated, structure.initial),
+    for tag, (unknowns, known) in zip(
+        ("Outputs", "Derivatives", "InitialUnknowns"), _unknowns(listed, structure), strict=True
     ):
-        if not slots:
-            continue
-        section = etree.SubElement(tree, tag)
-        for slot in slots:
-            unknown = etree.SubElement(section, "Unknown", index=str(index[slot]))
-            if (needed := known.get(slot)) is not None:  # None: all, said by leaving the attribute out
+        section = etree.SubElement(tree, tag) if unknowns else None
+        for e in unknowns:
+            unknown = etree.SubElement(section, "Unknown", index=str(index[e.slot]))
+            if (needed := known.get(e.slot)) is not None:  # None: all, said by leaving the attribute out
                 unknown.set("dependencies", " ".join(str(index[s]) for s in needed))
     return _text(root)
+
+
+def fmi3_description(
+    participant: Participant,
+    model: Model,
+    structure: Structure,
+    interfaces: Iterable[str],
+    experiment: DefaultExperiment,
+) -> bytes:
+    """Return modelDescription.xml of FMI 3.0: arrays are arrays, dependencies are those of any element."""
+    root = _common(participant, model, interfaces, "instantiationToken")
+    listed = elements(participant, arrays=True)
+    owner = {e.slot + i: e.slot for e in listed for i in range(e.size)}
+    state_of = {structure.derivative_of[e.slot]: e.slot for e in listed if e.slot in structure.derivative_of}
+    _add_units(root, ["s", *(unit_name(e.variable) for e in listed)])
+    _log_and_experiment(root, experiment)
+    variables = etree.SubElement(root, "ModelVariables")
+    time = "time"
+    while time in participant.variables:
+        time += "_"
+    etree.SubElement(
+        variables, "Float64", name=time, valueReference=str(participant.memory.size),
+        causality="independent", variability="continuous", unit="s",
+    )  # fmt: skip
+    for e in listed:
+        v = etree.SubElement(variables, "Float64", name=e.name, valueReference=str(e.slot))
+        _add_role(v, e)
+        for key, value in _bounds(e.variable).items():
+            v.set(key, value)
+        if e.role.has_start:
+            v.set("start", _start(e, participant.memory))
+        if e.slot in state_of:
+            v.set("derivative", str(state_of[e.slot]))
+        for size in e.variable.shape:
+            etree.SubElement(v, "Dimension", start=str(size))
+    tree = etree.SubElement(root, "ModelStructure")
+    for tag, (unknowns, known) in zip(
+        ("Output", "ContinuousStateDerivative", "InitialUnknown"), _unknowns(listed, structure), strict=True
+    ):
+        for e in unknowns:
+            unknown = etree.SubElement(tree, tag, valueReference=str(e.slot))
+            needed = [known.get(slot) for slot in range(e.slot, e.slot + e.size)]
+            if None not in needed:
+                whole = sorted({owner[s] for slots in needed for s in slots or ()})
+                unknown.set("dependencies", " ".join(map(str, whole)))
+    return _text(root)
+
+
+def _add_role(v: etree._Element, e: Element) -> None:
+    if e.variable.meaning:
+        v.set("description", e.variable.meaning)
+    v.set("causality", e.role.causality)
+    v.set("variability", e.role.variability)
+    if e.role.initial is not None:
+        v.set("initial", e.role.initial)
+
+
+def _unknowns(
+    listed: list[Element], structure: Structure
+) -> list[tuple[list[Element], Mapping[int, tuple[int, ...]]]]:
+    """Return outputs, derivatives and initial unknowns, each with its dependencies by slot."""
+    outputs = [e for e in listed if e.role.causality == "output"]
+    derivatives = [e for e in listed if e.variable.kind == "derivative"]
+    calculated = [e for e in listed if e.role.initial == "calculated"]
+    return [(outputs, structure.running), (derivatives, structure.running), (calculated, structure.initial)]

@@ -20,13 +20,14 @@ from cosim.compiler import lower
 from cosim.errors import CosimError
 from cosim.participant import Block, Continuous, Participant
 
-from .description import DefaultExperiment, fmi2_description
+from .description import DefaultExperiment, fmi2_description, fmi3_description
 from .link import ExportError, Platform, build_model, find_platform, host, link
 from .reference import reference_files
 from .structure import structure
 
 INTERFACES = ("ModelExchange", "CoSimulation")
-FMI_VERSIONS = ("2.0",)
+_DESCRIPTIONS = {"2.0": fmi2_description, "3.0": fmi3_description}
+FMI_VERSIONS = tuple(_DESCRIPTIONS)
 
 
 def export(
@@ -62,7 +63,8 @@ def export(
         raise ExportError(f"{name}: default experiment {plan}: step above zero and stop after start, please")
     kernels = lower(participant)
     model = build_model(participant, name, fmi_version, kernels)
-    text = fmi2_description(participant, model, structure(participant, kernels), offered, plan)
+    describe = _DESCRIPTIONS[fmi_version]
+    text = describe(participant, model, structure(participant, kernels), offered, plan)
     files = {"modelDescription.xml": text}
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.fmu"

@@ -30,6 +30,7 @@ static const unsigned legal[OPERATIONS] = {
     [DIFFERENTIATE] = INITIALIZING | RUNNING | TERMINATED,
     [ENTER_EVENT] = CONTINUOUS_TIME | EVENT,
     [UPDATE_DISCRETE] = EVENT,
+    [EVALUATE_DISCRETE] = INITIALIZING | EVENT,
     [ENTER_CONTINUOUS_TIME] = EVENT,
     [COMPLETE_STEP] = CONTINUOUS_TIME,
     [SET_TIME] = EVENT | CONTINUOUS_TIME,
@@ -38,6 +39,7 @@ static const unsigned legal[OPERATIONS] = {
     [GET_DERIVATIVES] = INITIALIZING | EVENT | CONTINUOUS_TIME | TERMINATED | BROKEN,
     [DO_STEP] = STEPPING,
     [STEP_STATUS] = STEPPING | TERMINATED | BROKEN,
+    [NEVER] = 0,
 };
 
 /* In which modes a variable may be written: states and parameters have exact start values,
@@ -281,8 +283,7 @@ void core_slot_name(uint32_t slot, char *text, size_t size) {
     }
 }
 
-/* The slots that reference i stands for: one, or with `whole` those of the variable that begins there. */
-static uint32_t extent(uint32_t reference, bool whole, const struct variable **variable) {
+uint32_t core_extent(uint32_t reference, bool whole, const struct variable **variable) {
     const struct variable *v = *variable = core_locate(reference);
     if (!v || !v->listed || (whole && v->first != reference)) return 0;
     return whole ? v->size : 1;
@@ -302,7 +303,7 @@ status core_get(struct instance *c, const uint32_t *references, size_t n, double
     for (size_t i = 0; i < n; i++) {
         const struct variable *v;
         bool time = whole && references[i] == model.n_slots;
-        uint32_t size = time ? 1 : extent(references[i], whole, &v);
+        uint32_t size = time ? 1 : core_extent(references[i], whole, &v);
         if (!size) return core_refuse(c, function, "unknown value reference %u", (unsigned)references[i]);
         computed |= !time && v->zone != INPUT && v->zone != PARAMETER;
         total += size;
@@ -314,7 +315,7 @@ status core_get(struct instance *c, const uint32_t *references, size_t n, double
         const struct variable *v;
         if (references[i] == model.n_slots) *values++ = c->t;
         else {
-            uint32_t size = extent(references[i], whole, &v);
+            uint32_t size = core_extent(references[i], whole, &v);
             memcpy(values, source + references[i], size * sizeof(double));
             values += size;
         }
@@ -346,7 +347,7 @@ status core_set(struct instance *c, const uint32_t *references, size_t n, const 
     size_t total = 0;
     for (size_t i = 0; i < n; i++) { /* all or nothing: check before the first write */
         const struct variable *v;
-        uint32_t size = extent(references[i], whole, &v);
+        uint32_t size = core_extent(references[i], whole, &v);
         if (!size) return core_refuse(c, function, "unknown value reference %u", (unsigned)references[i]);
         if (total + size > n_values) return count(c, n_values, total + size, function);
         if (check_writable(c, v, references[i], size, values + total, function)) return FAILED;
@@ -357,7 +358,7 @@ status core_set(struct instance *c, const uint32_t *references, size_t n, const 
     double *target = early ? c->settings : c->record;
     for (size_t i = 0; i < n; i++) {
         const struct variable *v;
-        uint32_t size = extent(references[i], whole, &v);
+        uint32_t size = core_extent(references[i], whole, &v);
         memcpy(target + references[i], values, size * sizeof(double));
         values += size;
     }

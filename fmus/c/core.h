@@ -50,6 +50,7 @@ enum operation {
     DIFFERENTIATE,
     ENTER_EVENT,
     UPDATE_DISCRETE,
+    EVALUATE_DISCRETE,
     ENTER_CONTINUOUS_TIME,
     COMPLETE_STEP,
     SET_TIME,
@@ -58,6 +59,7 @@ enum operation {
     GET_DERIVATIVES,
     DO_STEP,
     STEP_STATUS,
+    NEVER, /* what needs event mode in Co-Simulation, configuration mode or clocks */
     OPERATIONS
 };
 
@@ -138,14 +140,21 @@ status core_deserialize(struct instance *, const unsigned char *bytes, size_t si
                         const char *function);
 
 /* d unknown / d known in the direction `seed` (sensitivity.c). Unknowns are outputs, states and
-   derivatives, knowns inputs, states and (while initialising) parameters; one slot each. */
-status core_differentiate(struct instance *, const uint32_t *unknown, size_t n_unknown, const uint32_t *known,
-                          size_t n_known, const double *seed, double *result, const char *function);
+   derivatives, knowns inputs, states and (while initialising) parameters; references as in core_get. */
+struct direction {
+    const uint32_t *references;
+    size_t n;
+    size_t n_values; /* of seed or result */
+};
+status core_differentiate(struct instance *, struct direction unknown, struct direction known, bool whole,
+                          const double *seed, double *result, const char *function);
 
 /* Runs derivatives, then outputs, on any record; 0 or the kernel's code. */
 int32_t core_run(double *record, double t);
 /* The variable that owns a slot; NULL beyond the record. */
 const struct variable *core_locate(uint32_t slot);
+/* Number of slots that a reference stands for; 0 and no matter which variable when it is unknown. */
+uint32_t core_extent(uint32_t reference, bool whole, const struct variable **variable);
 /* First slot in [first, last) that is not finite, or `last`. */
 uint32_t core_first_not_finite(const double *record, uint32_t first, uint32_t last);
 /* "accel[3]", "K[2,3]", 1-based. */

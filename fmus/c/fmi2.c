@@ -148,7 +148,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference known[], size_t n_known,
                                         const fmi2Real seed[], fmi2Real result[]) {
     ENTER(DIFFERENTIATE);
-    DONE(core_differentiate(self, unknown, n_unknown, known, n_known, seed, result, __func__));
+    DONE(core_differentiate(self, (struct direction){unknown, n_unknown, n_unknown},
+                            (struct direction){known, n_known, n_known}, false, seed, result, __func__));
 }
 
 /* --- Model Exchange ------------------------------------------------------------------------- */

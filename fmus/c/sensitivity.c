@@ -22,53 +22,77 @@ static bool is_known(enum zone zone, enum mode mode) {
     return zone == INPUT || zone == STATE || (zone == PARAMETER && mode == INITIALIZING);
 }
 
-static status check(struct instance *c, const uint32_t *slots, size_t n, bool unknowns, const char *function) {
-    for (size_t i = 0; i < n; i++) {
-        const struct variable *v = core_locate(slots[i]);
-        if (!v || !v->listed)
-            return core_refuse(c, function, "unknown value reference %u", (unsigned)slots[i]);
+static status check(struct instance *c, struct direction d, bool whole, bool unknowns, const char *function) {
+    size_t total = 0;
+    for (size_t i = 0; i < d.n; i++) {
+        const struct variable *v;
+        uint32_t size = core_extent(d.references[i], whole, &v);
+        if (!size) return core_refuse(c, function, "unknown value reference %u", (unsigned)d.references[i]);
         if (unknowns ? !is_unknown(v->zone) : !is_known(v->zone, c->mode))
             return core_refuse(c, function, "%s is not %s", v->name,
                                unknowns ? "an output, state or derivative" : "an input or state, or a parameter "
                                "in initialization mode");
+        total += size;
     }
-    return OK;
+    if (total == d.n_values) return OK;
+    return core_refuse(c, function, "%zu values for %s of %zu elements", d.n_values,
+                       unknowns ? "unknowns" : "knowns", total);
 }
 
-/* f(z + e v), left in c->trial. */
-static status evaluate_at(struct instance *c, const uint32_t *known, size_t n, const double *seed, double e,
-                          const char *function) {
-    bool early = c->mode == INITIALIZING;
-    memcpy(c->trial, early ? c->settings : c->record, model.n_slots * sizeof(double));
-    for (size_t i = 0; i < n; i++) c->trial[known[i]] += e * seed[i];
-    int32_t code = early && model.initialize ? model.initialize(c->trial, c->t, 0.0) : 0;
-    if (!code) code = core_run(c->trial, c->t);
-    if (code) return core_refuse(c, function, "the equations gave up beside t = %.9g (code %d)", c->t, (int)code);
-    return OK;
+/* Adds e v to the knowns in `record`. */
+static void move(double *record, struct direction known, bool whole, const double *seed, double e) {
+    const struct variable *v;
+    for (size_t i = 0; i < known.n; i++)
+        for (uint32_t k = 0, size = core_extent(known.references[i], whole, &v); k < size; k++)
+            record[known.references[i] + k] += e * *seed++;
 }
 
-status core_differentiate(struct instance *c, const uint32_t *unknown, size_t n_unknown, const uint32_t *known,
-                          size_t n_known, const double *seed, double *result, const char *function) {
-    if (core_need(c, unknown, n_unknown, "unknowns", function) || core_need(c, known, n_known, "knowns", function) ||
-        core_need(c, seed, n_known, "seed", function) || core_need(c, result, n_unknown, "sensitivity", function))
+/* Adds w times the unknowns in `record` to `result`. */
+static void collect(const double *record, struct direction unknown, bool whole, double w, double *result) {
+    const struct variable *v;
+    for (size_t i = 0; i < unknown.n; i++)
+        for (uint32_t k = 0, size = core_extent(unknown.references[i], whole, &v); k < size; k++)
+            *result++ += w * record[unknown.references[i] + k];
+}
+
+/* The width that moves no known by more than a thousandth of its size; +inf for no direction at all. */
+static double width_of(const double *point, struct direction known, bool whole, const double *seed) {
+    const struct variable *v;
+    double width = INFINITY;
+    for (size_t i = 0; i < known.n; i++)
+        for (uint32_t k = 0, size = core_extent(known.references[i], whole, &v); k < size; k++, seed++) {
+            double room = RELATIVE_WIDTH * fmax(fabs(point[known.references[i] + k]), SMALLEST_SIZE);
+            if (*seed != 0.0) width = fmin(width, room / fabs(*seed));
+        }
+    return width;
+}
+
+status core_differentiate(struct instance *c, struct direction unknown, struct direction known, bool whole,
+                          const double *seed, double *result, const char *function) {
+    if (core_need(c, unknown.references, unknown.n, "unknowns", function) ||
+        core_need(c, known.references, known.n, "knowns", function) ||
+        core_need(c, seed, known.n_values, "seed", function) ||
+        core_need(c, result, unknown.n_values, "sensitivity", function))
         return FAILED;
     if (model.step) return core_refuse(c, function, "%s is a sampled block, without derivatives", model.identifier);
-    if (check(c, unknown, n_unknown, true, function) || check(c, known, n_known, false, function)) return FAILED;
-    const double *point = c->mode == INITIALIZING ? c->settings : c->record;
-    double width = INFINITY;
-    for (size_t i = 0; i < n_known; i++) {
+    if (check(c, unknown, whole, true, function) || check(c, known, whole, false, function)) return FAILED;
+    for (size_t i = 0; i < known.n_values; i++)
         if (!isfinite(seed[i])) return core_refuse(c, function, "seed %g is not finite", seed[i]);
-        if (seed[i] != 0.0)
-            width = fmin(width, RELATIVE_WIDTH * fmax(fabs(point[known[i]]), SMALLEST_SIZE) / fabs(seed[i]));
-    }
-    for (size_t i = 0; i < n_unknown; i++) result[i] = 0.0;
-    if (!isfinite(width)) return OK; /* no direction */
+    bool early = c->mode == INITIALIZING;
+    const double *point = early ? c->settings : c->record;
+    double width = width_of(point, known, whole, seed);
+    for (size_t i = 0; i < unknown.n_values; i++) result[i] = 0.0;
+    if (!isfinite(width)) return OK;
     static const double node[] = {1.0, -1.0, 2.0, -2.0}, weight[] = {4.0 / 6.0, -4.0 / 6.0, -1.0 / 12.0, 1.0 / 12.0};
     for (int k = 0; k < 4; k++) {
-        if (evaluate_at(c, known, n_known, seed, node[k] * width, function)) return FAILED;
-        for (size_t i = 0; i < n_unknown; i++) result[i] += weight[k] / width * c->trial[unknown[i]];
+        memcpy(c->trial, point, model.n_slots * sizeof(double));
+        move(c->trial, known, whole, seed, node[k] * width);
+        int32_t code = early && model.initialize ? model.initialize(c->trial, c->t, 0.0) : 0;
+        if (!code) code = core_run(c->trial, c->t);
+        if (code)
+            return core_refuse(c, function, "the equations gave up beside t = %.9g (code %d)", c->t, (int)code);
+        collect(c->trial, unknown, whole, weight[k] / width, result);
     }
-    for (size_t i = 0; i < n_unknown; i++)
-        if (!isfinite(result[i])) return core_refuse(c, function, "the derivative is not finite");
-    return OK;
+    uint32_t bad = core_first_not_finite(result, 0, (uint32_t)unknown.n_values);
+    return bad < unknown.n_values ? core_refuse(c, function, "derivative %u is not finite", (unsigned)bad) : OK;
 }

@@ -68,7 +68,7 @@ class Host:
     def call(self, name: str, *arguments: Any) -> int:
         """Call fmi2`name`(component, arguments): floats are double, integers int, sequences arrays."""
         function = getattr(self.library, f"fmi2{name}")
-        return int(function(ctypes.c_void_p(self.component), *map(_convert, arguments)))
+        return int(function(ctypes.c_void_p(self.component), *map(convert, arguments)))
 
     def setup(self, kind: int = CO_SIMULATION, start: float = 0.0, stop: float | None = None) -> None:
         """Instantiate and leave initialization mode."""
@@ -104,7 +104,7 @@ class Host:
         self.component = None
 
 
-def _convert(x: Any) -> Any:
+def convert(x: Any) -> Any:
     if isinstance(x, np.ndarray):
         return ctypes.c_void_p(x.ctypes.data)
     if isinstance(x, np.uint64):

@@ -16,6 +16,7 @@ from fmpy import simulate_fmu
 from scipy.linalg import eigh
 from scipy.signal import cont2discrete
 
+from fmus.export import FMI_VERSIONS
 from fmus.oscillator import Oscillator
 from fmus.shear_building import ShearBuilding, stiffness_matrix
 
@@ -172,7 +173,7 @@ def test_cvode_agrees_with_the_exact_solution(fmu_of: Callable[..., Path]) -> No
     assert relative(np.array([[result["x"][-1], result["v"][-1]]]), expected[None]) < 1e-6
 
 
-@pytest.mark.parametrize("version", ["2.0"])
+@pytest.mark.parametrize("version", FMI_VERSIONS)
 def test_ecos_computes_the_same(fmu_of: Callable[..., Path], version: str) -> None:
     """ecos steps by its own master: input set once, a hundred steps."""
     from ecospy import EcosSimulation, EcosSimulationStructure
