@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import platform
 import sys
@@ -21,6 +22,7 @@ def write_run(
     """Write a run to its folder; return lines that say what was found and where it is."""
     directory.mkdir(parents=True, exist_ok=True)
     metrics = scenario.metrics(result)
+    options = defaults(scenario) | options
     record = {
         "scenario": scenario.name,
         "command": " ".join(["cosim", *sys.argv[1:]]),
@@ -46,6 +48,12 @@ def write_run(
         *lines,
         f"{result.steps} steps in {result.seconds:.3g} s; {directory}: metrics.json, result.npz{drawn}",
     ]
+
+
+def defaults(scenario: Scenario) -> dict[str, Any]:
+    """Return the options of a scenario's run function and their defaults."""
+    parameters = inspect.signature(scenario.run).parameters
+    return {n: p.default for n, p in parameters.items() if p.default is not p.empty and n != "progress"}
 
 
 def _draw(directory: Path, scenario: Scenario, result: Result) -> list[str]:
