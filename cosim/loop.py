@@ -156,7 +156,8 @@ def run(
                     for i in range(n):
                         store_f8(b + 8 * i, load_f8(a + 8 * i) * scale + offset)
             elif code == CALL:
-                status = call_kernel(function, (a, t0 + (k + load_f8(w + 32)) * h, h))
+                # a block that acts at every so many points has a step of its own
+                status = call_kernel(function, (a, t0 + (k + load_f8(w + 32)) * h, h * every))
                 if status == 0 and n > 0:
                     status = -nonfinite(b, n)
             elif code == FMI2_VALUES:
