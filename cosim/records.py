@@ -86,8 +86,9 @@ class Record:
         note = f"resampled from {self.dt:g} s to {dt:g} s, {method}"
         if method == "linear":
             n = int(np.floor((self.values.size - 1) * self.dt / dt * (1.0 + 1e-12))) + 1
-            old = np.arange(self.values.size) * self.dt
-            values = np.interp(np.arange(n) * dt, old, self.values)
+            q = np.arange(n) * (dt / self.dt)
+            common = np.abs(q - np.round(q)) <= 1e-12 * np.maximum(q, 1.0)  # the same instant, rounded
+            values = np.interp(np.where(common, np.round(q), q), np.arange(self.values.size), self.values)
         else:
             ratio = Fraction(self.dt / dt).limit_denominator(1000)
             if ratio == 0 or ratio.numerator > 1000 or abs(float(ratio) * dt / self.dt - 1.0) > 1e-9:

@@ -24,45 +24,47 @@ import math
 
 import numpy as np
 
-from ..functions import assign
+from ..functions import assign, fill
 from ..variables import Array
 
 M1 = 4294967087.0
 M2 = 4294944443.0
+MODULI = np.array([M1, M2])
 
-#: three steps of the state ahead by 2^127 and 2^76 numbers, A^(2^127) mod m and A^(2^76) mod m
-A1_127 = np.array(
+#: for m1 and m2: the matrix that carries the state on by 2^127 numbers, A^(2^127) mod m
+SEED_JUMP = np.array(
     [
-        [2427906178.0, 3580155704.0, 949770784.0],
-        [226153695.0, 1230515664.0, 3580155704.0],
-        [1988835001.0, 986791581.0, 1230515664.0],
+        [
+            [2427906178.0, 3580155704.0, 949770784.0],
+            [226153695.0, 1230515664.0, 3580155704.0],
+            [1988835001.0, 986791581.0, 1230515664.0],
+        ],
+        [
+            [1464411153.0, 277697599.0, 1610723613.0],
+            [32183930.0, 1464411153.0, 1022607788.0],
+            [2824425944.0, 32183930.0, 2093834863.0],
+        ],
     ]
 )
-A2_127 = np.array(
+#: the same for 2^76 numbers
+STREAM_JUMP = np.array(
     [
-        [1464411153.0, 277697599.0, 1610723613.0],
-        [32183930.0, 1464411153.0, 1022607788.0],
-        [2824425944.0, 32183930.0, 2093834863.0],
-    ]
-)
-A1_76 = np.array(
-    [
-        [82758667.0, 1871391091.0, 4127413238.0],
-        [3672831523.0, 69195019.0, 1871391091.0],
-        [3672091415.0, 3528743235.0, 69195019.0],
-    ]
-)
-A2_76 = np.array(
-    [
-        [1511326704.0, 3759209742.0, 1610795712.0],
-        [4292754251.0, 1511326704.0, 3889917532.0],
-        [3859662829.0, 4292754251.0, 3708466080.0],
+        [
+            [82758667.0, 1871391091.0, 4127413238.0],
+            [3672831523.0, 69195019.0, 1871391091.0],
+            [3672091415.0, 3528743235.0, 69195019.0],
+        ],
+        [
+            [1511326704.0, 3759209742.0, 1610795712.0],
+            [4292754251.0, 1511326704.0, 3889917532.0],
+            [3859662829.0, 4292754251.0, 3708466080.0],
+        ],
     ]
 )
 
 
 def remainder(v: float, m: float) -> float:
-    """Return v mod m in [0, m), exact for whole numbers |v| < 2^53."""
+    """Return v mod m in [0, m), exact for whole numbers |v| < 2^53 - 2^32."""
     v -= math.floor(v / m) * m
     if v < 0.0:  # the quotient was rounded up to a whole number
         v += m
@@ -107,17 +109,14 @@ def power_of_state(A: Array, power: float, x: Array, work: Array, m: float) -> N
 
 def seed_streams(seed: float, streams: Array, work: Array) -> None:
     """Place every row of streams (n, 6) at the start of its stream; work (3, 3, 3)."""
-    for i in range(streams.shape[0]):
-        p, q = streams[i, 0:3], streams[i, 3:6]
-        if i == 0:
-            for j in range(6):
-                streams[0, j] = 12345.0
-            power_of_state(A1_127, seed, p, work, M1)
-            power_of_state(A2_127, seed, q, work, M2)
-        else:
-            assign(streams[i - 1], streams[i])
-            advance_state(A1_76, p, work[2, 0], M1)
-            advance_state(A2_76, q, work[2, 0], M2)
+    for part in range(2):
+        first = 3 * part
+        fill(streams[0, first : first + 3], 12345.0)
+        power_of_state(SEED_JUMP[part], seed, streams[0, first : first + 3], work, MODULI[part])
+        for i in range(1, streams.shape[0]):
+            x = streams[i, first : first + 3]
+            assign(streams[i - 1, first : first + 3], x)
+            advance_state(STREAM_JUMP[part], x, work[2, 0], MODULI[part])
 
 
 def uniform(state: Array) -> float:

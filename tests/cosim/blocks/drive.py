@@ -1,0 +1,55 @@
+"""Drive one participant by hand, interpreted and compiled, and keep its whole memory at every step."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from cosim.compiler import kernel_addresses
+from cosim.participant import Block, Participant
+from cosim.variables import Array
+
+_KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
+
+
+def drive(participant: Participant, inputs: Array, h: float, jit: bool) -> Array:
+    """Run the kernels over inputs (r, m) at t = k h; return the memory after every step, (r, slots)."""
+    p = participant.fresh()
+    names = ["step"] if isinstance(p, Block) else ["derivatives", "outputs", "advance"]
+    if jit:
+        found = kernel_addresses(p)
+        functions = {n: _KERNEL(address) for n, address in found.items()}
+        kernels = {n: (lambda t, h, n=n: functions[n](p.memory.ctypes.data, t, h)) for n in found}
+    else:
+        times = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
+        kernels = {n: (lambda t, h, n=n: getattr(p, n)(*(t, h)[: times[n]])) for n in p.kernels}
+    if "initialize" in kernels:
+        kernels["initialize"](0.0, 0.0)
+    rows = []
+    for k, u in enumerate(np.asarray(inputs, dtype=np.float64)):
+        if u.size:
+            p.input_vector[:] = u
+        for name in names:
+            if name in kernels:
+                assert not kernels[name](k * h, h)
+        rows.append(p.memory.copy())
+    return np.array(rows)
+
+
+def trace(participant: Participant, inputs: Array, h: float, port: str, jit: bool = False) -> Array:
+    """Return one port of the driven participant, (r, size)."""
+    v = participant.variables[port]
+    return drive(participant, inputs, h, jit)[:, v.slot : v.slot + v.size]
+
+
+def assert_same_bits(participant: Participant, inputs: Array, h: float) -> None:
+    """Interpreted and compiled leave the same bits in every slot at every step."""
+    interpreted, compiled = (drive(participant, inputs, h, jit) for jit in (False, True))
+    different = np.nonzero((interpreted.view(np.int64) != compiled.view(np.int64)).any(axis=0))[0]
+    names = {
+        n
+        for n, v in participant.variables.items()
+        if np.isin(different, range(v.slot, v.slot + v.size)).any()
+    }
+    assert not names, f"{participant!r}: {names} differ"
