@@ -145,7 +145,11 @@ def _with_progress(
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
         columns = [TextColumn("{task.completed}/{task.total}"), BarColumn(), TimeElapsedColumn()]
-        with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
+        console = Console(stderr=True)
+        shown = Progress(
+            *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
+        )
+        with shown as bar:
             task = bar.add_task("", total=None)
             return function(**options, progress=lambda k, n: bar.update(task, completed=k, total=n))
     except (SimulationError, Interrupted) as error:
