@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import llvmlite.binding as llvm
 from platformdirs import user_cache_path
 
-from .errors import CompilationError
+from .errors import CompilationError, CosimError
 
 if TYPE_CHECKING:
     from .participant import Participant
@@ -49,7 +49,13 @@ def cache_directory() -> Path:
     """Return the folder for compiled code; the environment variable STRUCTCOSIM_CACHE moves it."""
     chosen = os.environ.get("STRUCTCOSIM_CACHE")
     path = Path(chosen) if chosen else user_cache_path("structcosim", appauthor=False)
-    path.mkdir(parents=True, exist_ok=True)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CosimError(
+            f"compiled code cannot be kept in {path}: {error.strerror}; "
+            "name a folder that can be written in the environment variable STRUCTCOSIM_CACHE"
+        ) from error
     return path
 
 
@@ -71,7 +77,11 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 def _is_ours(value: Any) -> bool:
     """Tell whether a global of a kernel is a Python function that has to be compiled with it."""
-    return isinstance(value, types.FunctionType) and value.__module__.partition(".")[0] not in _LIBRARIES
+    return isinstance(value, types.FunctionType) and not _is_library(value.__module__ or "")
+
+
+def _is_library(module: str) -> bool:
+    return module.partition(".")[0] in _LIBRARIES
 
 
 def _names(code: types.CodeType) -> set[str]:
@@ -82,18 +92,28 @@ def _names(code: types.CodeType) -> set[str]:
 
 def _describe(value: Any, seen: dict[int, int]) -> str:
     """Return a text that changes when what a kernel computes with `value` can change."""
+    if isinstance(value, (tuple, list)):
+        return f"{type(value).__name__}({[_describe(item, seen) for item in value]})"
     if isinstance(value, types.CodeType):
         consts = [_describe(c, seen) for c in value.co_consts]
         return f"code({value.co_code.hex()},{value.co_names},{value.co_varnames},{consts})"
+    value = getattr(value, "py_func", value)  # a function under @njit
     if _is_ours(value):
         if id(value) in seen:
             return f"seen{seen[id(value)]}"
         seen[id(value)] = len(seen)
-        used = {n: value.__globals__[n] for n in sorted(_names(value.__code__)) if n in value.__globals__}
+        names = sorted(_names(value.__code__))
+        used = {n: value.__globals__[n] for n in names if n in value.__globals__}
+        modules = [
+            m for m in used.values() if isinstance(m, types.ModuleType) and not _is_library(m.__name__)
+        ]
+        used |= {f"{m.__name__}.{n}": getattr(m, n) for m in modules for n in names if hasattr(m, n)}
+        defaults = _describe([value.__defaults__, sorted((value.__kwdefaults__ or {}).items())], seen)
         cells = [_describe(c.cell_contents, seen) for c in value.__closure__ or ()]
         globals_ = [f"{n}={_describe(v, seen)}" for n, v in used.items()]
         return (
-            f"function({_describe(value.__code__, seen)},{cells},{globals_},{getattr(value, 'kernel', '')})"
+            f"function({_describe(value.__code__, seen)},{defaults},{cells},{globals_},"
+            f"{getattr(value, 'kernel', '')})"
         )
     if isinstance(value, types.ModuleType):
         return f"module({value.__name__})"
@@ -104,12 +124,24 @@ def _describe(value: Any, seen: dict[int, int]) -> str:
     return repr(value)
 
 
+@lru_cache(maxsize=1)
+def _own_source() -> str:
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+
+
 def fingerprint(functions: Mapping[str, Callable[..., Any]], *more: object) -> str:
     """Return a hash of functions, of all functions and constants they use, and of the tool versions."""
     seen: dict[int, int] = {}
     parts = [f"{name}:{_describe(function, seen)}" for name, function in functions.items()]
     parts += [repr(item) for item in more]
-    parts += [sys.version, version("numba"), version("llvmlite"), version("numpy"), llvm.get_host_cpu_name()]
+    parts += [
+        _own_source(),
+        sys.version,
+        version("numba"),
+        version("llvmlite"),
+        version("numpy"),
+        llvm.get_host_cpu_name(),
+    ]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
@@ -163,7 +195,10 @@ def _llvm_type(numba_type: Any) -> str:
 
 
 def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...], arguments: list[str]) -> str:
-    """Compile one function; return IR that defines `i32 name(arguments)`, 0 when it returned normally."""
+    """Compile one function; return IR that defines `i32 name(arguments)`.
+
+    It gives what the function returned, 0 for None, or Numba's code of the exception that was raised.
+    """
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.errors import NumbaError
 
@@ -177,6 +212,11 @@ def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...], arguments: li
             "array to a declared variable is such a one; use assign(x, self.y) or a loop"
         ) from error
     compiled = dispatcher.overloads[signature]
+    if arguments[0].endswith(" self") and str(compiled.signature.return_type) != "none":
+        kind = compiled.signature.return_type
+        raise CompilationError(
+            f"{name} returns a value ({kind}); a kernel writes to self and returns nothing"
+        )
     with global_compiler_lock:
         compiled.library._ensure_finalized()
     inner = compiled.fndesc.llvm_func_name
@@ -191,9 +231,14 @@ declare i32 @"{inner}"(ptr, ptr, {types_})
 define i32 @"{name}"({outer}) {{
   %ret = alloca i64
   %exc = alloca ptr
+  store i64 0, ptr %ret
   %status = call i32 @"{inner}"(ptr %ret, ptr %exc, {named})
   %none = icmp eq i32 %status, -2
-  %result = select i1 %none, i32 0, i32 %status
+  %zero = icmp eq i32 %status, 0
+  %returned = or i1 %none, %zero
+  %wide = load i64, ptr %ret
+  %value = trunc i64 %wide to i32
+  %result = select i1 %returned, i32 %value, i32 %status
   ret i32 %result
 }}
 """

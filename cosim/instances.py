@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 
 from .compiler import kernel_addresses
-from .errors import CompilationError
-from .opcodes import CALL, Op
-from .participant import Block, Continuous, Participant
+from .errors import CompilationError, DeclarationError, SimulationError
+from .opcodes import CALL, COPY, Op
+from .participant import KERNEL_TIMES, Block, Continuous, LinearContinuous, Participant
 from .variables import Array
 
 _KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
-_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
 
 
 class Failures:
@@ -32,6 +31,8 @@ class Failures:
         self.exception: BaseException | None = None
         self.participant = ""
         self.time = 0.0
+        #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
+        self.interrupted = False
 
     def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
         """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""
@@ -39,6 +40,8 @@ class Failures:
         def guarded(_: int, t: float, h: float) -> int:
             try:
                 function(t, h)
+                if self.interrupted:
+                    raise KeyboardInterrupt
             except BaseException as exception:
                 self.exception, self.participant, self.time = exception, name, t
                 return 1
@@ -56,6 +59,7 @@ class KernelInstance:
 
     def __init__(self, name: str, participant: Participant, jit: bool, failures: Failures) -> None:
         self.name = name
+        self.failures = failures
         self.participant = participant.fresh()
         self.base = self.participant.memory.ctypes.data
         self.callbacks: list[Any] = []
@@ -87,15 +91,48 @@ class KernelInstance:
 
     def _interpreted(self, kernel: str) -> Callable[[float, float], None]:
         method = getattr(self.participant, kernel)
-        times = _TIMES[kernel]
+        times = KERNEL_TIMES[kernel]
         return lambda t, h: method(*(t, h)[:times])
 
     def start(self, t0: float) -> None:
         """Run `initialize`, interpreted or compiled like everything else."""
         if "initialize" in self._addresses:
             function = _KERNEL(self._addresses["initialize"])
-            if function(self.base, t0, 0.0) != 0 and self.is_compiled:
-                self.participant.initialize()  # type: ignore[attr-defined]  # again, for its exception
+            if function(self.base, t0, 0.0) != 0 and self.failures.exception is None:
+                again = self.failures.guard(self.name, self._interpreted("initialize"))  # for its exception
+                if again(self.base, t0, 0.0) == 0:
+                    raise SimulationError(f"{self.name} failed in initialize(self); check its parameters")
+        if isinstance(self.participant, LinearContinuous) and self.failures.exception is None:
+            self._check_linear(t0)
+
+    def _check_linear(self, t0: float) -> None:
+        """Refuse derivatives whose response to states and inputs is no sum, or depends on t."""
+        p, saved = self.participant, self.participant.memory.copy()
+        derivatives = _KERNEL(self._addresses["derivatives"])
+        random = np.random.default_rng(1)
+        x, u = (random.uniform(-1.0, 1.0, (2, v.size)) for v in (p.state_vector, p.input_vector))
+
+        def response(t: float, i: float, j: float) -> Array:
+            p.memory[:] = saved
+            p.state_vector[:] = i * x[0] + j * x[1]
+            p.input_vector[:] = i * u[0] + j * u[1]
+            derivatives(self.base, t, 0.0)
+            first, size = p.zones["derivative"]
+            return p.memory[first : first + size].copy()
+
+        none, one, two, both = (response(t0, *ij) for ij in ((0, 0), (1, 0), (0, 1), (3, -2)))
+        later = response(t0 + 1.7, 3, -2)
+        p.memory[:] = saved
+        bound = 1e-9 * (np.abs(none) + np.abs(one) + np.abs(two) + np.abs(both)).max(initial=1e-300)
+        if self.failures.exception is not None:
+            return
+        finite = np.isfinite([none, one, two, both, later]).all()
+        off = np.abs([none + 3 * (one - none) - 2 * (two - none) - both, later - both])
+        if finite and (off > bound).any():
+            raise DeclarationError(
+                f"{self.name}: {type(p).__name__}.derivatives is not linear in states and inputs with "
+                "constant coefficients, which LinearContinuous needs; derive it from Continuous"
+            )
 
     def stop(self) -> None:
         """Nothing to release."""
@@ -141,14 +178,11 @@ class KernelInstance:
         return []
 
     def derivatives(self, target: int, fraction: float) -> list[Op]:
-        """Evaluate everything and copy the derivatives to `target`."""
-        from .opcodes import COPY
-
-        read = self.read(fraction, text="derivatives")
-        if "outputs" not in self._addresses:
-            read = [self._call("derivatives", "derivatives", fraction)]
+        """Evaluate the derivatives and copy them to `target`."""
+        if not self.n_states:
+            return []
         copy = Op("", COPY, a=self.derivative_address, b=target, n=self.n_states, weights=(1.0, 0.0))
-        return [*read, copy]
+        return [self._call("derivatives", "derivatives", fraction), copy]
 
     def complete(self) -> list[Op]:
         """Nothing happens between steps."""

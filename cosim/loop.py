@@ -192,6 +192,7 @@ def run(
                     if w3 != 0.0:
                         slope += w3 * load_f8(b + 8 * (3 * n + i))
                     store_f8(c + 8 * i, load_f8(a + 8 * i) + h * slope)
+                status = -nonfinite(c, n)
             elif code == FMI2_TIME:
                 status = fmi_status(call_time(function, (a, t0 + (k + load_f8(w + 32)) * h)))
             elif code == FMI2_VECTOR:

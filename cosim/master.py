@@ -8,18 +8,24 @@ from __future__ import annotations
 
 import ctypes
 import math
+import shutil
+import signal
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
+from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
 
 from .compiler import load, lower_function
-from .errors import SimulationError, TimeError, did_you_mean
+from .errors import RecordError, SimulationError, TimeError, WiringError, did_you_mean
 from .fmu import FMU
-from .opcodes import CALL, FMI2_VALUES, RECORD, TO_INT
+from .instances import Failures
+from .opcodes import CALL, COMBINE, FMI2_VALUES, RECORD, TO_INT
 from .program import Program, steps_between
 from .result import Result, Statistics
 from .system import Port, System, outputs_of
@@ -42,15 +48,28 @@ class Interrupted(KeyboardInterrupt):
         self.result = result
 
 
-@lru_cache(maxsize=1)
+_loop_lock = threading.Lock()
+
+
 def _loop() -> Callable[..., int]:
-    """Return the compiled loop."""
+    """Return the compiled loop; a second caller waits for the first."""
+    with _loop_lock:
+        return _compiled_loop()
+
+
+@lru_cache(maxsize=1)
+def _compiled_loop() -> Callable[..., int]:
     address = load(lower_function("run", "loop", "i8,i8,i8,i8,i8,i8,i8,f8,f8,i8"))("run")
     integer, real = ctypes.c_int64, ctypes.c_double
     function: Callable[..., int] = ctypes.CFUNCTYPE(ctypes.c_int32, *[integer] * 7, real, real, integer)(
         address
     )
     return function
+
+
+def warm_up() -> None:
+    """Compile the loop in a thread: worth it while an FMU is being linked, in a process of its own."""
+    threading.Thread(target=_loop, daemon=True).start()
 
 
 def simulate(
@@ -90,25 +109,29 @@ def simulate(
     """
     steps = _steps(step, start, stop)
     _choices(coupling, solver, decimation)
+    step, start, decimation = float(step), float(start), int(decimation)
     recorded = _ports(system, record)
     watched = recorded if statistics is None else _ports(system, statistics)
     program = Program(system, step, coupling, solver, recorded, watched, decimation, jit)
     try:
-        return _Run(program, steps, start, decimation).run(progress)
+        with _ctrl_c(program.failures):
+            return _Run(program, steps, start, decimation).run(progress)
     finally:
         program.close()
 
 
 def schedule(system: System, *, step: float, coupling: Coupling = "sampled", solver: Solver = "ode3") -> str:
     """Return what happens in one communication step, a line an operation."""
-    program = Program(system, step, coupling, solver, [], [], 1, True)
+    _steps(step, 0.0, step)
+    _choices(coupling, solver, 1)
+    program = Program(system, float(step), coupling, solver, [], [], 1, True)
     program.close()
     return program.schedule()
 
 
 def _steps(step: float, start: float, stop: float) -> int:
     for name, value in (("step", step), ("start", start), ("stop", stop)):
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
+        if not isinstance(value, Real) or not math.isfinite(value):
             raise TimeError(f"{name}={value!r} is no finite number of seconds")
     if step <= 0.0:
         raise TimeError(f"step={step:g} s; a communication step is above zero")
@@ -124,7 +147,7 @@ def _choices(coupling: str, solver: str, decimation: int) -> None:
         )
     if solver not in TABLEAUS:
         raise TimeError(f"solver '{solver}' is not known" + did_you_mean(solver, TABLEAUS))
-    if int(decimation) != decimation or decimation < 1:
+    if not isinstance(decimation, Integral) or decimation < 1:
         raise TimeError(f"decimation={decimation!r} is no whole number of steps, 1 or more")
 
 
@@ -135,6 +158,8 @@ def _ports(system: System, names: Iterable[str] | None) -> list[Port]:
             for name, member in system.participants.items()
             for port in (member.declared_outputs if isinstance(member, FMU) else outputs_of(member))
         ]
+    if isinstance(names, str):
+        raise WiringError(f"'{names}' is one name; give a list of ports, [\"{names}\"]")
     return [_readable(system, name) for name in names]
 
 
@@ -148,6 +173,30 @@ def _readable(system: System, name: str) -> Port:
     return system.port(name, "output")
 
 
+@contextmanager
+def _ctrl_c(failures: Failures) -> Iterator[None]:
+    """Let Ctrl-C end the run between chunks or after a callback.
+
+    Raised at any moment it may strike while Python enters a callback from C, where the
+    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def note(number: int, frame: object) -> None:
+        if failures.interrupted:
+            raise KeyboardInterrupt
+        failures.interrupted = True
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 class _Run:
     """One run of a program: chunks of the compiled loop, and what is served in between."""
 
@@ -159,12 +208,20 @@ class _Run:
         self.report = np.zeros(_REPORT, dtype=np.int64)
         rows = steps // decimation + 1
         shape = (rows, program.columns)
-        if rows * program.columns * 8 > MEMORY_LIMIT:
+        size = rows * program.columns * 8
+        if size > MEMORY_LIMIT:
+            folder = tempfile.gettempdir()
+            free = shutil.disk_usage(folder).free
+            if size > free:
+                raise RecordError(
+                    f"{program.columns} numbers at {rows} points take {size / 1e9:.3g} GB and {folder} has "
+                    f"{free / 1e9:.3g} GB free; record fewer ports (record=[...]), or with decimation="
+                )
             file = tempfile.TemporaryFile(prefix="structcosim-")  # noqa: SIM115  lives as long as the arrays
             self.data: Array = np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
         else:
             self.data = np.empty(shape)
-        self.began = 0.0
+        self.began = time.perf_counter()
 
     def run(self, progress: Callable[[int, int], None] | None) -> Result:
         program = self.program
@@ -176,7 +233,7 @@ class _Run:
             if program.failures.exception is not None:
                 raise self._error(0, 0, 0)
         self.began = time.perf_counter()
-        done, chunk = 0, 500
+        done, chunk = 0, 1  # grows: a slow callback must not hold up progress and Ctrl-C
         try:
             while done <= self.steps:
                 until = min(done + chunk, self.steps + 1)
@@ -197,6 +254,8 @@ class _Run:
                     if isinstance(program.failures.exception, KeyboardInterrupt):
                         raise program.failures.exception
                     raise self._error(*(int(x) for x in self.report[:3]))
+                if program.failures.interrupted:
+                    raise KeyboardInterrupt
                 done = until
                 took = time.perf_counter() - before
                 chunk = max(1, min(int(chunk * 0.1 / max(took, 1e-6)), 4 * chunk, 1_000_000))
@@ -257,10 +316,9 @@ class _Run:
         op = [*program.first, *program.second][row]
         t = op.seconds(self.start, k, program.h)
         instance = program.instances[op.participant]
-        if status < 0 and op.code in (CALL, FMI2_VALUES, TO_INT):
-            base = op.b if op.code == CALL else (op.c if op.code == FMI2_VALUES else op.a)
-            address = base + 8 * (-1 - status if op.code == TO_INT else -status - 1)
-            variable = instance.locate(address)
+        checked = {CALL: op.b, COMBINE: op.c, FMI2_VALUES: op.c, TO_INT: op.a}
+        if status < 0 and op.code in checked:
+            variable = instance.locate(checked[op.code] + 8 * (-status - 1))
             what = "is not a whole number" if op.code == TO_INT else "is not finite (NaN or infinite)"
             text = (
                 f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); "

@@ -9,7 +9,7 @@ COPY = 0  # n floats a -> b, times w0 plus w1
 CALL = 1  # kernel `function` on record a at the row's time; then n floats at b must be finite
 RECORD = 2  # append the floats whose n addresses are at a to buffer b
 STATISTICS = 3  # update (min, max, sum, sum of squares) at b for the n addresses at a
-COMBINE = 4  # c = a + h sum_i w_i b_i, vectors of n floats, b one row a stage
+COMBINE = 4  # c = a + h sum_i w_i b_i, vectors of n floats, b one row a stage; c must be finite
 TO_FLOAT = 5  # n int32 at a -> floats at b
 TO_INT = 6  # n floats at a -> int32 at b; a fraction is an error
 FMI2_VALUES = 10  # get or set n values at c by value references b; with d > 0 they must be finite

@@ -13,9 +13,11 @@ the record itself. The zones are visible to kernels as arrays too: `input_vector
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import math
 from collections.abc import Callable, Mapping
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,9 +26,20 @@ from .errors import DeclarationError, did_you_mean
 from .functions import integrate_ode4, linear_hold
 from .variables import KINDS, Array, Local, Parameter, Variable
 
+#: kernels, and how many of (t, h) each takes
+KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
 _VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
+_RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
 #: size names that a Continuous works out itself
 _AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
+
+
+def whole_number(what: str, value: Any) -> int:
+    """Return a number that has to be whole and above zero as an int."""
+    number = float(value) if isinstance(value, Real) else math.nan
+    if not (number.is_integer() and number >= 1.0):
+        raise DeclarationError(f"{what}={value!r} is no whole number, 1 or more")
+    return int(number)
 
 
 class Participant:
@@ -52,10 +65,24 @@ class Participant:
                     del declared[name]
         cls._declared = cls._complete(declared)
         for name, variable in cls._declared.items():
-            if name in _VECTORS or name in ("every", "sample_period", "variables", "memory"):
+            if cls._is_reserved(name):
                 raise DeclarationError(f"{cls.__name__}: '{name}' is a name of structcosim's own; rename it")
             if variable.kind == "derivative":
                 setattr(cls, name, variable)
+        for name in cls.KERNELS:
+            kernel = vars(cls).get(name)
+            wanted = ("self", "t", "h")[: 1 + KERNEL_TIMES[name]]
+            code = getattr(kernel, "__code__", None)
+            if kernel is not None and (code is None or code.co_argcount != len(wanted)):
+                raise DeclarationError(f"{cls.__name__}.{name}: write it as def {name}({', '.join(wanted)})")
+
+    @classmethod
+    def _is_reserved(cls, name: str) -> bool:
+        """Tell whether a name is a method or an attribute of ours, not a variable."""
+        ours = [base for base in cls.__mro__ if base.__module__ == __name__]
+        return name in _RESERVED or any(
+            not isinstance(vars(b).get(name, cls._declared[name]), Variable) for b in ours
+        )
 
     @classmethod
     def _complete(cls, declared: dict[str, Variable]) -> dict[str, Variable]:
@@ -79,7 +106,7 @@ class Participant:
         sizes: dict[str, int] = {}
         for name, value in values.items():
             if name in symbols:
-                sizes[name] = int(value)
+                sizes[name] = whole_number(f"{where}: size {name}", value)
             elif name not in settable:
                 raise DeclarationError(
                     f"{where} has no parameter or variable '{name}'"
@@ -196,6 +223,10 @@ class Participant:
         """Return a copy with a record of its own: what a run works on, so that runs repeat."""
         other = copy.copy(self)
         other._bind(self.memory.copy())
+        bound = {"memory", "variables", "zones", "_views", *_VECTORS}
+        for name in vars(self).keys() - bound:
+            with contextlib.suppress(TypeError):  # an open file and the like cannot be copied and is shared
+                setattr(other, name, copy.deepcopy(vars(self)[name]))
         return other
 
     # ----------------------------------------------------------------- kernels
@@ -243,12 +274,14 @@ class Block(Participant):
         where = type(self).__name__
         if every is not None and sample_period is not None:
             raise DeclarationError(f"{where}: give every or sample_period, not both")
-        if every is not None and (int(every) != every or every < 1):
-            raise DeclarationError(f"{where}: every={every!r} is no whole number of steps, 1 or more")
-        if sample_period is not None and not (math.isfinite(sample_period) and sample_period > 0):
+        if type(self).step is Block.step:
+            raise DeclarationError(f"{where} has no step(self, t, h); a Block needs one")
+        if sample_period is not None and not (
+            isinstance(sample_period, Real) and math.isfinite(sample_period) and sample_period > 0
+        ):
             raise DeclarationError(f"{where}: sample_period={sample_period!r} s is not above zero")
-        self.every = None if every is None else int(every)
-        self.sample_period = sample_period
+        self.every = None if every is None else whole_number(f"{where}: every", every)
+        self.sample_period = None if sample_period is None else float(sample_period)
         super().__init__(**values)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -258,7 +291,7 @@ class Block(Participant):
 
     def step(self, t: float, h: float) -> None:
         """Read the inputs at t, write the outputs that hold until the next call; h is the step."""
-        raise DeclarationError(f"{type(self).__name__} has no step(self, t, h); a Block needs one")
+        raise NotImplementedError
 
 
 class Continuous(Participant):
@@ -280,6 +313,14 @@ class Continuous(Participant):
     max_step = Parameter(np.inf, "largest internal step of advance", unit="s", min=1e-12, fixed=True)
     integrator_work = Local(0.0, "stages of advance", shape=(3, "n_states"))
 
+    def __init__(self, **values: Any) -> None:
+        if not hasattr(type(self), "derivatives"):
+            raise DeclarationError(
+                f"{type(self).__name__} has no derivatives(self, t); a Continuous needs it "
+                "(what has no continuous state is a Block)"
+            )
+        super().__init__(**values)
+
     @classmethod
     def _complete(cls, declared: dict[str, Variable]) -> dict[str, Variable]:
         solver = next(base for base in cls.__mro__ if "advance" in vars(base))
@@ -289,6 +330,10 @@ class Continuous(Participant):
         for name, state in declared.items():
             derived[name] = state
             if state.kind == "state":
+                if f"der_{name}" in declared:
+                    raise DeclarationError(
+                        f"{cls.__name__}: 'der_{name}' is the derivative of '{name}'; rename one of them"
+                    )
                 unit = None if state.unit is None else f"({state.unit})/s"
                 derived[f"der_{name}"] = Variable(
                     "derivative", 0.0, f"derivative of {name}", unit, state.shape, name=f"der_{name}"

@@ -35,8 +35,11 @@ Instance: TypeAlias = KernelInstance | FMUInstance
 def steps_between(period: float, h: float, what: str) -> int:
     """Return period / h, a whole number of steps; another ratio is refused."""
     ratio = period / h
+    if not ratio < 2**53:
+        raise TimeError(f"{what} of {period:g} s is {ratio:g} steps of {h:g} s, more than can be counted")
     steps = round(ratio)
-    if steps < 1 or abs(ratio - steps) > 1e-9 * max(steps, 1):
+    # room for the round-off of decimal numbers, and never for more than a millionth of a step
+    if steps < 1 or abs(ratio - steps) > min(1e-9 * steps, 1e-6):
         near = period / max(round(ratio + 0.5), 1)
         raise TimeError(
             f"{what} of {period:g} s is {ratio:.6g} communication steps of {h:g} s; "
@@ -130,11 +133,14 @@ class Program:
         return self.instances[port.participant].address(port.name) + 8 * port.first
 
     def _delays(self) -> dict[int, Array]:
-        """Return the memory of the connections that are one step late, by their index."""
+        """Return the memory of the connections that are one step late, by their index.
+
+        Row 0 is the source at t_{k-1}, which all of the step uses; row 1 the source at t_k.
+        """
         delays = {}
         for i, c in enumerate(self.system.connections):
             if c.initial is not None:
-                delays[i] = np.array(np.broadcast_to(c.initial, c.source.count), dtype=np.float64)
+                delays[i] = np.tile(c.initial, (2, 1))
                 self.buffers.append(delays[i])
         return delays
 
@@ -162,9 +168,16 @@ class Program:
         for i, memory in delays.items():
             source = self.system.connections[i].source
             text = f"keep {source} for the next step"
-            address = self._address(source)
-            ops.append(Op(text, COPY, a=address, b=memory.ctypes.data, n=source.count, weights=(1.0, 0.0)))
+            kept = memory[1].ctypes.data
+            ops.append(Op(text, COPY, a=self._address(source), b=kept, n=source.count, weights=(1.0, 0.0)))
         return ops
+
+    def _release(self, delays: dict[int, Array]) -> list[Op]:
+        """Return the operations that turn what was kept into the value of the next step."""
+        return [
+            Op("", COPY, a=m[1].ctypes.data, b=m[0].ctypes.data, n=m.shape[1], weights=(1.0, 0.0))
+            for m in delays.values()
+        ]
 
     def _block(self, name: str, delays: dict[int, Array], fraction: float = 0.0, every: int = 1) -> list[Op]:
         instance = self.instances[name]
@@ -209,18 +222,19 @@ class Program:
         for name in self.order:
             self.first += self._block(name, delays, every=self.rates[name] or 1)
         self.first += self._sinks(decimation)
-        self.first += self._remember(delays) if delays else []
+        self.first += self._remember(delays)
         for name in moving:
             self.second += [*self._copies(name, delays), *self.instances[name].latch()]
         for name in moving:
             self.second += self.instances[name].advance()
+        self.second += self._release(delays)
 
     # ------------------------------------------------------------------- stage coupling
 
     def _stage_coupling(self, solver: str, delays: dict[int, Array], decimation: int) -> None:
         nodes, rows, weights = TABLEAUS[solver]
         moving = [n for n in self.instances if not self._is_block(n)]
-        order = self._stage_order(moving)
+        rounds = self._rounds(moving)
         work = {n: buffer((1 + len(nodes)) * self.instances[n].n_states) for n in moving}
         self.buffers += work.values()
         for stage, (c, row) in enumerate(zip(nodes, rows, strict=True)):
@@ -229,7 +243,7 @@ class Program:
                 if stage > 0:
                     ops += self._state_of(name, work[name], row, f"{name}: states of stage {stage + 1}")
                 ops += self.instances[name].set_states(c)
-            ops += self._evaluation(order, delays, c, stage)
+            ops += self._evaluation(rounds, delays, c, stage)
             if stage == 0:
                 self.first = [*ops, *self._sinks(decimation), *self._remember(delays)]
                 for name in moving:
@@ -246,68 +260,64 @@ class Program:
         for name in moving:
             self.second += self._state_of(name, work[name], weights, f"{name}: states at t + h")
             self.second += [*self.instances[name].set_states(1.0), *self.instances[name].complete()]
+        self.second += self._release(delays)
 
     def _state_of(self, name: str, work: Array, weights: tuple[float, ...], text: str) -> list[Op]:
         instance = self.instances[name]
         n, base = instance.n_states, int(work.ctypes.data)
         a, b, c = base, base + 8 * n, instance.state_address
-        return [Op(text, COMBINE, a=a, b=b, c=c, n=n, weights=weights)] if n else []
+        return [Op(text, COMBINE, a=a, b=b, c=c, n=n, weights=weights, participant=name)] if n else []
 
     def _with_inputs(self, name: str, delays: dict[int, Array]) -> list[Op]:
         return [*self._copies(name, delays), *self.instances[name].latch()]
 
-    def _evaluation(self, order: list[str], delays: dict[int, Array], c: float, stage: int) -> list[Op]:
-        """Return one evaluation of all outputs and blocks at a stage, in the order of dependence."""
+    def _evaluation(
+        self, rounds: list[dict[str, bool]], delays: dict[int, Array], c: float, stage: int
+    ) -> list[Op]:
+        """Return one evaluation of all outputs and blocks at a stage."""
         ops: list[Op] = []
-        for node in order:
-            name, _, when = node.partition(":")
-            if not when:
-                rate = self.rates[name]
-                if rate is None or stage == 0:
-                    ops += self._block(name, delays, c, rate or 1)
-            elif when == "late":
-                ops += [*self._with_inputs(name, delays), *self.instances[name].read(c)]
-            else:
-                ops += self.instances[name].read(c)
+        for members in rounds:
+            for name, feedthrough in members.items():
+                if not self._is_block(name):
+                    ops += self._with_inputs(name, delays) if feedthrough else []
+                    ops += self.instances[name].read(c)
+                elif self.rates[name] is None or stage == 0:
+                    ops += self._block(name, delays, c, self.rates[name] or 1)
         return ops
 
-    def _stage_order(self, moving: list[str]) -> list[str]:
-        """Order blocks and outputs by dependence.
+    def _rounds(self, moving: list[str]) -> list[dict[str, bool]]:
+        """Order blocks and outputs by dependence, in rounds of what does not depend on each other.
 
-        A participant is read early for the outputs that do not depend on its inputs
-        ("plant:early"), and late, after its inputs are known, for those that do
-        ("plant:late").
+        An output that depends on inputs follows their sources; the others come first. So a
+        participant may be read in several rounds: its accelerations after the forces that
+        follow from its displacements. The value tells whether it is read after its inputs.
         """
-        graph: dict[str, list[str]] = {}
         through = {n: self.instances[n].feedthrough() for n in moving}
         used = [*self.recorded, *self.watched, *(c.source for c in self.system.connections)]
-        for name in self.instances:
-            if name not in moving:
-                graph[name] = []
-            elif self.instances[name].has_outputs:
-                ports = {p.name for p in used if p.participant == name}
-                if any(not through[name].get(p) for p in ports):
-                    graph[f"{name}:early"] = []
-                if any(through[name].get(p) for p in ports):
-                    graph[f"{name}:late"] = []
+        graph: dict[tuple[str, str], list[tuple[str, str]]] = {(name, ""): [] for name in self.order}
+        graph |= {(p.participant, p.name): [] for p in used if p.name in through.get(p.participant, {})}
         for c in self.system.connections:
-            if c.initial is not None:
-                continue
-            a, b = c.source.participant, c.target.participant
-            direct = a in moving and through[a].get(c.source.name)
-            source = f"{a}:late" if direct else (f"{a}:early" if a in moving else a)
-            if b in moving:
-                # a late reading follows the inputs on which an output in use depends
-                needed = set().union(*through[b].values())
-                if f"{b}:late" in graph and c.target.name in needed and source in graph:
-                    graph[f"{b}:late"].append(source)
-            elif source in graph:
-                graph[b].append(source)
+            if c.initial is None:
+                a, b = c.source.participant, c.target.participant
+                source = (a, c.source.name if a in moving else "")
+                for name, port in graph:
+                    if name == b and (b not in moving or c.target.name in through[b][port]):
+                        graph[name, port].append(source)
+        sorter = TopologicalSorter(graph)
         try:
-            return list(TopologicalSorter(graph).static_order())
+            sorter.prepare()
         except CycleError as error:
-            path = [n.partition(":")[0] for n in error.args[1]]
+            path = [name for name, _ in error.args[1]]
             raise WiringError(cycle_text(path, self.system.connections)) from None
+        rounds: list[dict[str, bool]] = []
+        while sorter.is_active():
+            ready = sorter.get_ready()
+            sorter.done(*ready)
+            rounds.append({})
+            for name, port in ready:
+                after_inputs = name in moving and bool(through[name][port])
+                rounds[-1][name] = after_inputs or rounds[-1].get(name, False)
+        return rounds
 
     # ------------------------------------------------------------------------- as text
 

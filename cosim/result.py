@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -15,6 +16,14 @@ from .variables import Array
 
 if TYPE_CHECKING:
     import pandas
+
+
+#: what .npz keeps beside time, signals and statistics
+_SAVED = ("units", "step", "steps", "seconds", "schedule", "interrupted")
+
+
+def _values(value: Any) -> Any:
+    return np.array(value) if isinstance(value, list) else value
 
 
 @dataclass(frozen=True)
@@ -77,10 +86,10 @@ class Result:
         return flat
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the signals: .npz (exact, with units) or .csv (17 digits)."""
+        """Write everything as .npz (exact), or the signals as .csv (17 digits)."""
         path = Path(path)
         if path.suffix == ".npz":
-            meta = json.dumps({"units": self.units, "step": self.step, "interrupted": self.interrupted})
+            meta = json.dumps({name: getattr(self, name) for name in _SAVED} | {"statistics": self._listed()})
             arrays: dict[str, Any] = {"time": self.time, **self.signals}
             np.savez(path, _meta=np.array(meta), **arrays)
         elif path.suffix == ".csv":
@@ -99,11 +108,17 @@ class Result:
             with np.load(path) as data:
                 meta = json.loads(str(data["_meta"]))
                 signals = {n: data[n] for n in data.files if n not in ("_meta", "time")}
-                return cls(
-                    data["time"], signals, meta["units"], step=meta["step"], interrupted=meta["interrupted"]
-                )
-        except (OSError, ValueError, KeyError) as error:
+                listed = meta.pop("statistics")
+                statistics = {port: Statistics(*map(_values, values)) for port, values in listed.items()}
+                return cls(data["time"], signals, statistics=statistics, **meta)
+        except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
             raise RecordError(f"{path} is no result that was saved as .npz: {error}") from error
+
+    def _listed(self) -> dict[str, list[Any]]:
+        return {
+            port: [np.asarray(getattr(s, f.name)).tolist() for f in fields(s)]
+            for port, s in self.statistics.items()
+        }
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a DataFrame with the time as index; needs pandas."""

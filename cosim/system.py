@@ -17,17 +17,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
+
+import numpy as np
 
 from .errors import WiringError, did_you_mean
+from .fmu import FMU
 from .participant import Block, Participant
 from .units import conversion
 from .variables import Array
 
-if TYPE_CHECKING:
-    from .fmu import FMU
-
-Member: TypeAlias = "Participant | FMU"
+Member: TypeAlias = Participant | FMU
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Connection:
     target: Port
     scale: float = 1.0
     offset: float = 0.0
-    initial: Array | float | None = None
+    initial: Array | None = None
 
     def __str__(self) -> str:
         delayed = "" if self.initial is None else " (one step late)"
@@ -98,6 +98,11 @@ class System:
         """Add a participant under a name (letters, digits, underscores)."""
         if not re.fullmatch(r"[A-Za-z_]\w*", name):
             raise WiringError(f"participant name '{name}' must be letters, digits and underscores")
+        if not isinstance(member, (Participant, FMU)):
+            made = (
+                f"{member.__name__}(...)" if isinstance(member, type) else "a Block, a Continuous or an FMU"
+            )
+            raise WiringError(f"'{name}' is {member!r}, which is no participant; give {made}")
         if name in self.participants:
             raise WiringError(f"there is a participant '{name}' already; choose another name")
         if any(member is other for other in self.participants.values()):
@@ -109,8 +114,8 @@ class System:
 
         The same unit is passed through, a compatible one converted, any other refused. A
         scalar output may feed every element of an array input. `initial` delays the
-        connection by one communication step and is the value at the first point: the way
-        to break a cycle of blocks.
+        connection by one communication step and is the source's value, in its unit,
+        before the first point: the way to break a cycle of blocks.
         """
         out = self.port(source, "output")
         into = self.port(target, "input")
@@ -131,8 +136,12 @@ class System:
             scale, offset = conversion(out.unit, into.unit)
         except WiringError as error:
             raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
-        self.connections.append(Connection(out, into, scale, offset, initial))
-        self.block_order()
+        self.connections.append(Connection(out, into, scale, offset, _initial(out, initial)))
+        try:
+            self.block_order()
+        except WiringError:
+            self.connections.pop()
+            raise
 
     def port(self, text: str, direction: str) -> Port:
         """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
@@ -175,6 +184,19 @@ class System:
             raise WiringError(cycle_text(error.args[1], self.connections)) from None
 
 
+def _initial(source: Port, value: Array | float | None) -> Array | None:
+    """Return the value of a delayed connection before the first point, with the shape of its source."""
+    if value is None:
+        return None
+    try:
+        array = np.array(np.broadcast_to(np.asarray(value, dtype=np.float64).ravel(), source.count))
+    except (TypeError, ValueError):
+        array = np.array([np.nan])
+    if not np.isfinite(array).all():
+        raise WiringError(f"initial={value!r} does not fit {source}: give {source.count} finite number(s)")
+    return array
+
+
 def cycle_text(path: list[str], connections: list[Connection]) -> str:
     """Return the message for an algebraic cycle through the named participants."""
     links = []
@@ -189,7 +211,7 @@ def cycle_text(path: list[str], connections: list[Connection]) -> str:
 
 def _element(port: Port, index: str) -> Port:
     """Return the part of an array port that an index such as [3], [2:4] or [2,1] names."""
-    match = re.fullmatch(r"\[(\d+)(?:([:,])(\d+))?\]", index)
+    match = re.fullmatch(r"\[(\d{1,9})(?:([:,])(\d{1,9}))?\]", index)
     shape = port.shape
     rank = 2 if match and match[2] == "," else 1
     if not match or len(shape) != rank:
