@@ -24,7 +24,6 @@ import math
 
 import numpy as np
 
-from ..functions import assign, fill
 from ..variables import Array
 
 M1 = 4294967087.0
@@ -78,25 +77,24 @@ def multiply_add(a: float, b: float, c: float, m: float) -> float:
     return remainder(remainder(high * b, m) * 131072.0 + low * b + c, m)
 
 
-def advance_state(A: Array, x: Array, y: Array, m: float) -> None:
-    """x = A x mod m; y is working memory, both (3,)."""
-    assign(x, y)
+def advance_state(work: Array, x: Array, m: float) -> None:
+    """x = A x mod m, A = work[0]; x (3,), work (3, 3, 3)."""
+    for i in range(3):
+        work[2, 0, i] = x[i]
     for i in range(3):
         total = 0.0
         for j in range(3):
-            total = multiply_add(A[i, j], y[j], total, m)
+            total = multiply_add(work[0, i, j], work[2, 0, j], total, m)
         x[i] = total
 
 
-def power_of_state(A: Array, power: float, x: Array, work: Array, m: float) -> None:
-    """x = A^power x mod m by repeated squaring; work (3, 3, 3)."""
-    for i in range(3):
-        assign(A[i], work[0, i])
+def advance_state_by_power(work: Array, power: float, x: Array, m: float) -> None:
+    """x = A^power x mod m by repeated squaring of A = work[0]."""
     while power >= 1.0:
-        half = math.floor(power / 2.0)
+        half = math.floor(power / 2.0) * 1.0
         if power - 2.0 * half == 1.0:
-            advance_state(work[0], x, work[2, 0], m)
-        power = half * 1.0
+            advance_state(work, x, m)
+        power = half
         for i in range(3):
             for j in range(3):
                 total = 0.0
@@ -104,19 +102,30 @@ def power_of_state(A: Array, power: float, x: Array, work: Array, m: float) -> N
                     total = multiply_add(work[0, i, k], work[0, k, j], total, m)
                 work[1, i, j] = total
         for i in range(3):
-            assign(work[1, i], work[0, i])
+            for j in range(3):
+                work[0, i, j] = work[1, i, j]
 
 
 def seed_streams(seed: float, streams: Array, work: Array) -> None:
-    """Place every row of streams (n, 6) at the start of its stream; work (3, 3, 3)."""
+    """Place every row of streams (n, 6) at the start of its stream; work (3, 3, 3).
+
+    Loops in place of `assign`: every further function and kind of array costs a
+    third of a second of compilation.
+    """
     for part in range(2):
         first = 3 * part
-        fill(streams[0, first : first + 3], 12345.0)
-        power_of_state(SEED_JUMP[part], seed, streams[0, first : first + 3], work, MODULI[part])
+        for i in range(3):
+            streams[0, first + i] = 12345.0
+            for j in range(3):
+                work[0, i, j] = SEED_JUMP[part, i, j]
+        advance_state_by_power(work, seed, streams[0, first : first + 3], MODULI[part])
+        for i in range(3):
+            for j in range(3):
+                work[0, i, j] = STREAM_JUMP[part, i, j]
         for i in range(1, streams.shape[0]):
-            x = streams[i, first : first + 3]
-            assign(streams[i - 1, first : first + 3], x)
-            advance_state(STREAM_JUMP[part], x, work[2, 0], MODULI[part])
+            for j in range(3):
+                streams[i, first + j] = streams[i - 1, first + j]
+            advance_state(work, streams[i, first : first + 3], MODULI[part])
 
 
 def uniform(state: Array) -> float:
