@@ -96,7 +96,7 @@ class System:
 
     def add(self, name: str, member: Member) -> None:
         """Add a participant under a name (letters, digits, underscores)."""
-        if not re.fullmatch(r"[A-Za-z_]\w*", name):
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_]\w*", name):
             raise WiringError(f"participant name '{name}' must be letters, digits and underscores")
         if not isinstance(member, (Participant, FMU)):
             made = (

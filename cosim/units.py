@@ -49,6 +49,12 @@ def conversion(source: str | None, target: str | None) -> tuple[float, float]:
         raise WiringError(
             f"'{source}' ({a.dimensionality}) is not convertible to '{target}' ({b.dimensionality})"
         )
+    angles = [bool(re.search("radian|degree|turn|revolution", str(unit))) for unit in (a, b)]
+    cycles = ["hertz" in str(unit) for unit in (a, b)]
+    if (angles[0] and cycles[1]) or (cycles[0] and angles[1]):  # to pint both are 1/s, without the 2 pi
+        raise WiringError(
+            f"'{source}' to '{target}': Hz counts cycles, rad/s radians; convert by 2 pi yourself"
+        )
     quantity = registry().Quantity
     offset = float(quantity(0.0, a).to(b).magnitude)
     return float(quantity(1.0, a).to(b).magnitude) - offset, offset
