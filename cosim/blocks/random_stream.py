@@ -63,11 +63,12 @@ STREAM_JUMP = np.array(
 
 
 def remainder(v: float, m: float) -> float:
-    """Return v mod m in [0, m), exact for whole numbers |v| < 2^53 - 2^32."""
-    v -= math.floor(v / m) * m
-    if v < 0.0:  # the quotient was rounded up to a whole number
-        v += m
-    return v
+    """Return v mod m in [0, m), exact for whole numbers |v| < 2^53 - 2^32.
+
+    The quotient is a whole number or at least 1/m > 2^-32 away from one; below 2^21 it
+    is rounded by at most 2^-33, so never across a whole number.
+    """
+    return v - math.floor(v / m) * m
 
 
 def multiply_add(a: float, b: float, c: float, m: float) -> float:

@@ -105,6 +105,17 @@ def test_remainder_is_exact(v, m):
     assert remainder(float(v), float(m)) == v % m
 
 
+@given(st.integers(-(2**21) + 2, 2**21 - 2), st.sampled_from([-1, 0, 1]), st.sampled_from(M))
+def test_remainder_next_to_a_multiple(k, off, m):
+    """Where a rounded quotient would cross a whole number first."""
+    assert remainder(float(k * m + off), float(m)) == (k * m + off) % m
+
+
+def test_a_uniform_number_is_never_zero():
+    """p = q, once in 2^32 numbers: m1 stands for 0, so that the logarithm is finite."""
+    assert uniform(np.zeros(6)) == float(M[0]) * 2.328306549295727688e-10
+
+
 N = 200_000
 
 
