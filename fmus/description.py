@@ -209,7 +209,14 @@ def _bounds(v: Variable) -> dict[str, str]:
 
 
 def _start(e: Element, memory: np.ndarray) -> str:
-    return " ".join(repr(float(x)) for x in memory[e.slot : e.slot + e.size])
+    return " ".join(_double(x) for x in memory[e.slot : e.slot + e.size])
+
+
+def _double(x: float) -> str:
+    """Return a number as XML Schema writes it: the shortest text that reads back as the same double."""
+    if np.isinf(x):
+        return "INF" if x > 0 else "-INF"
+    return repr(float(x))
 
 
 def _text(root: etree._Element) -> bytes:

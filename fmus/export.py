@@ -69,9 +69,10 @@ def export(
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.fmu"
         here = find_platform(host())
-        _write(trial, files | _binaries(name, {here: link(model, here)}, fmi_version))
+        libraries = {p: link(model, p) for p in {here: None} | dict.fromkeys(wanted)}
+        _write(trial, files | _binaries(name, {here: libraries[here]}, fmi_version))
         files |= reference_files(trial, participant, plan, offered)
-    files |= _binaries(name, {p: link(model, p) for p in wanted}, fmi_version)
+    files |= _binaries(name, {p: libraries[p] for p in wanted}, fmi_version)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _write(target, files)

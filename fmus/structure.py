@@ -104,20 +104,25 @@ def _changes(
     """Return, for every unknown slot, the known ones that change it in a probe; None outside the domain."""
     run = _runner(participant, address)
     changed = {slot: set[int]() for slot in unknown}
+    slots = np.array(unknown)
+    first, size = participant.zones["local"]  # working memory: what is in it before does not matter
+    ports, rest = slice(0, first), slice(first + size, None)
     generator = np.random.default_rng(1)
     for probe in range(2 * _PROBES):
         base = _point(participant, generator, origin=probe % 2 == 0)
         t = generator.uniform(0.1, 1.0)
-        before = base.copy()
-        if not run(before, t) or not np.isfinite(before[unknown]).all():
+        record = base.copy()
+        if not run(record, t) or not np.isfinite(record[slots]).all():
             return None
+        before = record[slots]
         for s in known:
-            after = base.copy()
-            after[s] = _moved(after[s], generator)
-            if not run(after, t):
+            record[ports], record[rest] = base[ports], base[rest]
+            record[s] = _moved(base[s], generator)
+            if not run(record, t):
                 return None
-            same = np.isclose(after[unknown], before[unknown], rtol=_ROUNDING, atol=0.0)
-            for slot in np.array(unknown)[~same]:
+            # negated, so that NaN is a change
+            same = np.abs(record[slots] - before) <= _ROUNDING * np.abs(before)
+            for slot in slots[~same]:
                 changed[int(slot)].add(s)
     return changed
 

@@ -223,9 +223,13 @@ status core_reset(struct instance *c) {
 /* --- evaluation ----------------------------------------------------------------------------- */
 
 uint32_t core_first_not_finite(const double *record, uint32_t first, uint32_t last) {
-    double sum = 0.0; /* x - x is 0, or NaN for an x that is not finite: no branch per slot */
-    for (uint32_t i = first; i < last; i++) sum += record[i] - record[i];
-    if (sum == 0.0) return last;
+    uint64_t bad = 0; /* all bits of the exponent set: infinity or NaN; no branch per slot */
+    for (uint32_t i = first; i < last; i++) {
+        uint64_t bits;
+        memcpy(&bits, record + i, sizeof bits);
+        bad |= (bits & 0x7ff0000000000000u) == 0x7ff0000000000000u;
+    }
+    if (!bad) return last;
     while (first < last && isfinite(record[first])) first++;
     return first;
 }
@@ -251,8 +255,12 @@ status core_evaluate(struct instance *c, const char *function) {
     }
     int32_t code = core_run(c->record, c->t);
     if (code) return core_refuse(c, function, "the equations gave up at t = %.9g (code %d)", c->t, (int)code);
-    uint32_t last = model.zone[DERIVATIVE + 1], slot = core_first_not_finite(c->record, 0, last);
-    if (slot < last) return not_finite(c, slot, function);
+    static const enum zone computed[] = {OUTPUT, DERIVATIVE}; /* inputs and states are checked when they are set */
+    for (int i = 0; i < 2; i++) {
+        uint32_t last = model.zone[computed[i] + 1];
+        uint32_t slot = core_first_not_finite(c->record, model.zone[computed[i]], last);
+        if (slot < last) return not_finite(c, slot, function);
+    }
     c->stale = false;
     return OK;
 }
@@ -289,6 +297,16 @@ uint32_t core_extent(uint32_t reference, bool whole, const struct variable **var
     return whole ? v->size : 1;
 }
 
+/* The loop of a master reads and writes elements of zones that are all readable or writable: no search.
+   True when every reference lies below `end`; `*computed`: one of them is no input. */
+static bool all_below(uint32_t end, const uint32_t *references, size_t n, bool *computed) {
+    uint32_t largest = 0;
+    for (size_t i = 0; i < n; i++)
+        if (references[i] > largest) largest = references[i];
+    *computed = largest >= model.zone[OUTPUT];
+    return n > 0 && largest < end;
+}
+
 static status count(struct instance *c, size_t have, size_t want, const char *function) {
     if (have == want) return OK;
     return core_refuse(c, function, "%zu values for variables of %zu elements", have, want);
@@ -300,6 +318,12 @@ status core_get(struct instance *c, const uint32_t *references, size_t n, double
     if (core_need(c, values, n_values, "values", function)) return FAILED;
     size_t total = 0;
     bool computed = false;
+    if (!whole && !(c->mode & INITIALIZING) && all_below(model.zone[LOCAL], references, n, &computed)) {
+        if (computed && core_evaluate(c, function)) return FAILED;
+        for (size_t i = 0; i < n; i++) values[i] = c->record[references[i]];
+        return OK;
+    }
+    computed = false;
     for (size_t i = 0; i < n; i++) {
         const struct variable *v;
         bool time = whole && references[i] == model.n_slots;
@@ -330,10 +354,10 @@ static status check_writable(struct instance *c, const struct variable *v, uint3
                            writable[v->zone] ? "now" : "at all", mode_name(c->mode));
     for (uint32_t k = 0; k < size; k++) {
         char name[128];
-        bool inside = v->zone != PARAMETER || (values[k] >= v->min && values[k] <= v->max);
-        if (isfinite(values[k]) && inside) continue;
+        bool bounded = v->zone == PARAMETER && !isnan(values[k]); /* a parameter may be infinite: no limit */
+        if (bounded ? values[k] >= v->min && values[k] <= v->max : isfinite(values[k])) continue;
         core_slot_name(first + k, name, sizeof name);
-        if (isfinite(values[k]))
+        if (bounded)
             return core_refuse(c, function, "%s = %g is outside [%g, %g]", name, values[k], v->min, v->max);
         return core_refuse(c, function, "%s = %g is not finite", name, values[k]);
     }
@@ -345,6 +369,13 @@ status core_set(struct instance *c, const uint32_t *references, size_t n, const 
     if (core_need(c, references, n, "valueReferences", function)) return FAILED;
     if (core_need(c, values, n_values, "values", function)) return FAILED;
     size_t total = 0;
+    bool computed;
+    if (!whole && (c->mode & RUNNING) && all_below(model.zone[OUTPUT], references, n, &computed) &&
+        core_first_not_finite(values, 0, (uint32_t)n) == n) {
+        for (size_t i = 0; i < n; i++) c->record[references[i]] = values[i];
+        c->stale = true;
+        return OK;
+    }
     for (size_t i = 0; i < n; i++) { /* all or nothing: check before the first write */
         const struct variable *v;
         uint32_t size = core_extent(references[i], whole, &v);

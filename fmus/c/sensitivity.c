@@ -22,7 +22,7 @@ static bool is_known(enum zone zone, enum mode mode) {
     return zone == INPUT || zone == STATE || (zone == PARAMETER && mode == INITIALIZING);
 }
 
-static status check(struct instance *c, struct direction d, bool whole, bool unknowns, const char *function) {
+static status check_direction(struct instance *c, struct direction d, bool whole, bool unknowns, const char *function) {
     size_t total = 0;
     for (size_t i = 0; i < d.n; i++) {
         const struct variable *v;
@@ -75,7 +75,7 @@ status core_differentiate(struct instance *c, struct direction unknown, struct d
         core_need(c, result, unknown.n_values, "sensitivity", function))
         return FAILED;
     if (model.step) return core_refuse(c, function, "%s is a sampled block, without derivatives", model.identifier);
-    if (check(c, unknown, whole, true, function) || check(c, known, whole, false, function)) return FAILED;
+    if (check_direction(c, unknown, whole, true, function) || check_direction(c, known, whole, false, function)) return FAILED;
     for (size_t i = 0; i < known.n_values; i++)
         if (!isfinite(seed[i])) return core_refuse(c, function, "seed %g is not finite", seed[i]);
     bool early = c->mode == INITIALIZING;

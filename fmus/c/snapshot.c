@@ -20,7 +20,7 @@ struct snapshot {
 
 size_t core_serialized_size(void) { return sizeof(struct snapshot) + model.n_slots * sizeof(double); }
 
-static status check(struct instance *c, const struct snapshot *s, const char *function) {
+static status check_snapshot(struct instance *c, const struct snapshot *s, const char *function) {
     unsigned alone = s->mode & (BEFORE_RUNNING | EVENT | CONTINUOUS_TIME | STEPPING | TERMINATED | BROKEN);
     unsigned other = s->interface == MODEL_EXCHANGE ? STEPPING : EVENT | CONTINUOUS_TIME;
     if (memcmp(s->token, model.token, strlen(model.token) + 1))
@@ -52,7 +52,7 @@ status core_snapshot(struct instance *c, void **snapshot, const char *function) 
 status core_restore(struct instance *c, const void *snapshot, const char *function) {
     if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
     const struct snapshot *s = snapshot;
-    if (check(c, s, function)) return FAILED;
+    if (check_snapshot(c, s, function)) return FAILED;
     c->mode = (enum mode)s->mode;
     c->t = s->t;
     c->start_time = s->start_time;
@@ -87,7 +87,7 @@ status core_deserialize(struct instance *c, const unsigned char *bytes, size_t s
     struct snapshot *s = malloc(size);
     if (!s) return core_refuse(c, function, "out of memory");
     memcpy(s, bytes, size); /* bytes of the host need not be aligned */
-    if (check(c, s, function)) {
+    if (check_snapshot(c, s, function)) {
         free(s);
         return FAILED;
     }

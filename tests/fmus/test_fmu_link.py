@@ -6,6 +6,8 @@ import ctypes
 import hashlib
 import importlib.util
 import struct
+import subprocess
+import sys
 import time
 import zipfile
 from collections.abc import Callable
@@ -17,11 +19,11 @@ import fmus.export
 import fmus.link
 from cosim.participant import Block
 from cosim.variables import Input, Output
-from fmus.export import ExportError, export
-from fmus.link import check_symbols
+from fmus.export import FMI_VERSIONS, ExportError, export
+from fmus.link import build_model, check_symbols
 from fmus.oscillator import Oscillator
 
-from .host import ERROR, OK, Host
+from .host import ERROR, OK, Accumulator, Host
 
 ELF_MACHINE = {"x86_64": 62, "aarch64": 183}
 MACH_CPU = {"x86_64": 0x01000007, "aarch64": 0x0100000C}
@@ -154,6 +156,19 @@ def test_what_the_compiler_says_reaches_the_user(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(fmus.link, "_table", lambda *_: "this is no C\n")
     with pytest.raises(ExportError, match=r"Oscillator cannot be linked for .*: .*error"):
         export(Oscillator(), tmp_path / "o.fmu")
+
+
+@pytest.mark.parametrize("version", FMI_VERSIONS)
+def test_the_front_end_compiles_without_a_warning(tmp_path: Path, version: str) -> None:
+    plant = Accumulator(m=2, n=3)
+    model = build_model(plant, "Accumulator", version, "")
+    (tmp_path / "model.c").write_text(fmus.link._unit(model))
+    (tmp_path / "start.bin").write_bytes(model.start)
+    flags = [flag for flag in fmus.link._FLAGS if flag not in ("-s", "-shared")]
+    flags += [f"-I{fmus.link._fmi_headers()}", f"-I{fmus.link._FRONT_END}", f"--embed-dir={tmp_path}"]
+    command = [sys.executable, "-m", "ziglang", "cc", *flags, "-Wshadow", "-Werror", "-c", "model.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 class Gate(Block):
