@@ -31,6 +31,7 @@ from .opcodes import (
     FMI2_VECTOR,
     FMI3_DO_STEP,
     FMI3_VALUES,
+    GATHER,
     INTEGERS,
     RECORD,
     STATISTICS,
@@ -92,22 +93,15 @@ call_vector = _caller("i8", "i8", "i8")  # fmi2SetContinuousStates(c, x, n) and 
 call_completed = _caller("i8", "i4", "i8", "i8")  # fmi2CompletedIntegratorStep(c, noSet, *enter, *terminate)
 call_values3 = _caller("i8", "i8", "i8", "i8", "i8")  # fmi3GetFloat64(c, vr, n, values, nValues)
 call_do_step3 = _caller("i8", "f8", "f8", "i4", "i8", "i8", "i8", "i8")  # fmi3DoStep
+EXPONENT = 0x7FF0000000000000  # of a float64: all ones in NaN and infinity only
 load_i4, load_i8, load_f8 = _loader("i4"), _loader("i8"), _loader("f8")
 store_i4, store_i8, store_f8 = _storer("i4"), _storer("i8"), _storer("f8")
 
 
 def nonfinite(address: int, n: int) -> int:
     """Return 1 + the index of the first NaN or infinity of n floats, or 0."""
-    a, b = 0.0, 0.0
-    for i in range(0, n - 1, 2):
-        a += load_f8(address + 8 * i) * 0.0
-        b += load_f8(address + 8 * i + 8) * 0.0
-    if n % 2 == 1:
-        a += load_f8(address + 8 * n - 8) * 0.0
-    if a == 0.0 and b == 0.0:
-        return 0
     for i in range(n):
-        if load_f8(address + 8 * i) * 0.0 != 0.0:
+        if load_i8(address + 8 * i) & EXPONENT == EXPONENT:
             return i + 1
     return 0
 
@@ -147,7 +141,10 @@ def run(
             n = load_i8(op + 48)
             w = weights + 8 * WEIGHTS * row
             status = 0
-            if code == COPY:
+            if code == GATHER:
+                for i in range(n):
+                    store_f8(load_i8(a + 16 * i + 8), load_f8(load_i8(a + 16 * i)))
+            elif code == COPY:
                 scale, offset = load_f8(w), load_f8(w + 8)
                 if scale == 1.0 and offset == 0.0:
                     for i in range(n):

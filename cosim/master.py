@@ -241,7 +241,7 @@ class _Run:
                 failed = loop(
                     integers.ctypes.data,
                     floats.ctypes.data,
-                    len(program.first),
+                    program.n_first,
                     len(integers),
                     done,
                     until,
@@ -313,7 +313,7 @@ class _Run:
             error.__cause__ = failures.exception
             error.result = self._result(interrupted=True)
             return error
-        op = [*program.first, *program.second][row]
+        op = program.rows[row]
         t = op.seconds(self.start, k, program.h)
         instance = program.instances[op.participant]
         checked = {CALL: op.b, COMBINE: op.c, FMI2_VALUES: op.c, TO_INT: op.a}

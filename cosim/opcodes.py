@@ -12,6 +12,7 @@ STATISTICS = 3  # update (min, max, sum, sum of squares) at b for the n addresse
 COMBINE = 4  # c = a + h sum_i w_i b_i, vectors of n floats, b one row a stage; c must be finite
 TO_FLOAT = 5  # n int32 at a -> floats at b
 TO_INT = 6  # n floats at a -> int32 at b; a fraction is an error
+GATHER = 7  # n floats, from the first to the second address of n pairs at a
 FMI2_VALUES = 10  # get or set n values at c by value references b; with d > 0 they must be finite
 FMI2_DO_STEP = 11
 FMI2_TIME = 12

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from graphlib import CycleError, TopologicalSorter
+from itertools import groupby
 from typing import TypeAlias
 
 import numpy as np
@@ -23,7 +24,7 @@ from .errors import TimeError, WiringError
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
-from .opcodes import COMBINE, COPY, RECORD, STATISTICS, Op
+from .opcodes import COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
 from .participant import Block
 from .system import Connection, Port, System, cycle_text
 from .tableaus import TABLEAUS
@@ -322,10 +323,25 @@ class Program:
     # ------------------------------------------------------------------------- as text
 
     def tables(self) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.int64]], Array]:
-        """Return the integer and the float part of the table."""
-        ops = [*self.first, *self.second]
-        integers = np.array([op.integers(i) for i, op in enumerate(ops)], dtype=np.int64)
-        return integers.reshape(-1, 9), np.array([op.floats() for op in ops], dtype=np.float64)
+        """Return the integer and the float part of the table; `rows` are its operations."""
+        first = self._merged(self.first)
+        self.n_first = len(first)
+        self.rows = [*first, *self._merged(self.second)]
+        integers = np.array([op.integers(i) for i, op in enumerate(self.rows)], dtype=np.int64)
+        return integers.reshape(-1, 9), np.array([op.floats() for op in self.rows], dtype=np.float64)
+
+    def _merged(self, ops: list[Op]) -> list[Op]:
+        """Join neighbouring copies of a few floats to one operation: less to look up for the loop."""
+        merged: list[Op] = []
+        for plain, group in groupby(ops, key=_copied_as_is):
+            if plain == 0:
+                merged += group
+                continue
+            pairs = [(op.a + 8 * i, op.b + 8 * i) for op in group for i in range(op.n)]
+            table = np.array(pairs, dtype=np.int64)
+            self.buffers.append(table)  # type: ignore[arg-type]
+            merged.append(Op("", GATHER, a=int(table.ctypes.data), n=len(pairs), every=plain))
+        return merged
 
     def schedule(self) -> str:
         """Return the schedule of one communication step, a line an operation."""
@@ -336,6 +352,11 @@ class Program:
 
         title = "sampled coupling" if self.coupling == "sampled" else self.coupling
         return "\n".join([title, "at t_k:", *lines(self.first), "to t_k+1:", *lines(self.second)])
+
+
+def _copied_as_is(op: Op) -> int:
+    """Return the rate of an operation that copies a few floats without a factor, 0 for another one."""
+    return op.every if op.code == COPY and op.n <= 8 and op.weights == (1.0, 0.0) else 0
 
 
 def _names(ports: list[Port]) -> str:

@@ -27,6 +27,8 @@ class LowPass(Continuous):
     tau = Parameter(0.1, "time constant", unit="s", min=1e-12)
     u = Input("signal", shape="n")
     y = State(0.0, "filtered signal", shape="n")
+    held = Local(0.0, "step for which approach is valid", unit="s")
+    approach = Local(0.0, "1 - e^(-h / tau)")
 
     if TYPE_CHECKING:
         der_y: Array
@@ -42,9 +44,10 @@ class LowPass(Continuous):
             self.der_y[i] = (self.u[i] - self.y[i]) / self.tau  # (2.17)
 
     def advance(self, t: float, h: float) -> None:
-        approach = -math.expm1(-h / self.tau)
+        if h != self.held:
+            self.held, self.approach = h, -math.expm1(-h / self.tau)
         for i in range(self.y.shape[0]):
-            self.y[i] += approach * (self.u[i] - self.y[i])
+            self.y[i] += self.approach * (self.u[i] - self.y[i])
 
 
 class DiscreteLowPass(Block):

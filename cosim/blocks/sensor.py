@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import DeclarationError
 from ..functions import dot
 from ..participant import Continuous, LinearContinuous
-from ..variables import Array, Input, Output, Parameter, State
+from ..variables import Array, Input, Local, Output, Parameter, State
 from .ports import length, set_unit
 
 
@@ -30,6 +30,8 @@ class SensorDynamics(Continuous):
     u = Input("true signal", shape="n")
     y = State(0.0, "measured signal", shape="n")
     z = State(0.0, "its rate", shape="n")
+    held = Local(0.0, "step for which decay is valid", unit="s")
+    decay = Local(0.0, "e^(-h / mu)")
 
     if TYPE_CHECKING:
         der_y: Array
@@ -47,7 +49,9 @@ class SensorDynamics(Continuous):
 
     def advance(self, t: float, h: float) -> None:
         r = h / self.mu
-        decay = math.exp(-r)
+        if h != self.held:
+            self.held, self.decay = h, math.exp(-r)
+        decay = self.decay
         for i in range(self.y.shape[0]):
             e, z = self.y[i] - self.u[i], self.z[i]
             self.y[i] = self.u[i] + decay * ((1.0 + r) * e + h * z)
