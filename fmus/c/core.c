@@ -15,6 +15,10 @@
 #define READABLE (INITIALIZING | RUNNING | TERMINATED | BROKEN)
 #define ANY (BEFORE_INITIALIZATION | READABLE)
 
+#define SELDOM __attribute__((noinline, cold))
+/* Before loops over a handful of ports: vector code would cost more than it saves. */
+#define PLAIN_LOOP _Pragma("clang loop vectorize(disable) unroll(disable)")
+
 static const unsigned legal[OPERATIONS] = {
     [SET_LOGGING] = ANY,
     [PREPARE] = BEFORE_INITIALIZATION,
@@ -68,7 +72,7 @@ static const char *mode_name(enum mode mode) {
 
 /* --- log ------------------------------------------------------------------------------------ */
 
-static void write_log(struct instance *c, status s, const char *category, const char *function,
+SELDOM static void write_log(struct instance *c, status s, const char *category, const char *function,
                       const char *format, va_list arguments) {
     char text[512];
     int used = snprintf(text, sizeof text, "%s: ", function);
@@ -77,7 +81,7 @@ static void write_log(struct instance *c, status s, const char *category, const 
     if (c->sink && c->logger) c->sink(c, s, category, text);
 }
 
-status core_refuse(struct instance *c, const char *function, const char *format, ...) {
+SELDOM status core_refuse(struct instance *c, const char *function, const char *format, ...) {
     if (c->log_errors) {
         va_list arguments;
         va_start(arguments, format);
@@ -224,6 +228,7 @@ status core_reset(struct instance *c) {
 
 uint32_t core_first_not_finite(const double *record, uint32_t first, uint32_t last) {
     uint64_t bad = 0; /* all bits of the exponent set: infinity or NaN; no branch per slot */
+    PLAIN_LOOP
     for (uint32_t i = first; i < last; i++) {
         uint64_t bits;
         memcpy(&bits, record + i, sizeof bits);
@@ -240,7 +245,7 @@ int32_t core_run(double *record, double t) {
     return code;
 }
 
-static status not_finite(struct instance *c, uint32_t slot, const char *function) {
+SELDOM static status not_finite(struct instance *c, uint32_t slot, const char *function) {
     char name[128];
     core_slot_name(slot, name, sizeof name);
     return core_refuse(c, function, "%s became %g at t = %.9g", name, c->record[slot], c->t);
@@ -301,6 +306,7 @@ uint32_t core_extent(uint32_t reference, bool whole, const struct variable **var
    True when every reference lies below `end`; `*computed`: one of them is no input. */
 static bool all_below(uint32_t end, const uint32_t *references, size_t n, bool *computed) {
     uint32_t largest = 0;
+    PLAIN_LOOP
     for (size_t i = 0; i < n; i++)
         if (references[i] > largest) largest = references[i];
     *computed = largest >= model.zone[OUTPUT];
@@ -312,18 +318,13 @@ static status count(struct instance *c, size_t have, size_t want, const char *fu
     return core_refuse(c, function, "%zu values for variables of %zu elements", have, want);
 }
 
-status core_get(struct instance *c, const uint32_t *references, size_t n, double *values, size_t n_values,
-                bool whole, const char *function) {
+__attribute__((noinline)) static status get_any(struct instance *c, const uint32_t *references, size_t n,
+                                                double *values, size_t n_values, bool whole,
+                                                const char *function) {
     if (core_need(c, references, n, "valueReferences", function)) return FAILED;
     if (core_need(c, values, n_values, "values", function)) return FAILED;
     size_t total = 0;
     bool computed = false;
-    if (!whole && !(c->mode & INITIALIZING) && all_below(model.zone[LOCAL], references, n, &computed)) {
-        if (computed && core_evaluate(c, function)) return FAILED;
-        for (size_t i = 0; i < n; i++) values[i] = c->record[references[i]];
-        return OK;
-    }
-    computed = false;
     for (size_t i = 0; i < n; i++) {
         const struct variable *v;
         bool time = whole && references[i] == model.n_slots;
@@ -347,6 +348,18 @@ status core_get(struct instance *c, const uint32_t *references, size_t n, double
     return OK;
 }
 
+status core_get(struct instance *c, const uint32_t *references, size_t n, double *values, size_t n_values,
+                bool whole, const char *function) {
+    bool computed;
+    if (whole || !references || !values || (c->mode & INITIALIZING) ||
+        !all_below(model.zone[LOCAL], references, n, &computed))
+        return get_any(c, references, n, values, n_values, whole, function);
+    if (computed && core_evaluate(c, function)) return FAILED;
+    PLAIN_LOOP
+    for (size_t i = 0; i < n; i++) values[i] = c->record[references[i]];
+    return OK;
+}
+
 static status check_writable(struct instance *c, const struct variable *v, uint32_t first, uint32_t size,
                              const double *values, const char *function) {
     if (!(writable[v->zone] & c->mode))
@@ -364,18 +377,12 @@ static status check_writable(struct instance *c, const struct variable *v, uint3
     return OK;
 }
 
-status core_set(struct instance *c, const uint32_t *references, size_t n, const double *values,
-                size_t n_values, bool whole, const char *function) {
+__attribute__((noinline)) static status set_any(struct instance *c, const uint32_t *references, size_t n,
+                                                const double *values, size_t n_values, bool whole,
+                                                const char *function) {
     if (core_need(c, references, n, "valueReferences", function)) return FAILED;
     if (core_need(c, values, n_values, "values", function)) return FAILED;
     size_t total = 0;
-    bool computed;
-    if (!whole && (c->mode & RUNNING) && all_below(model.zone[OUTPUT], references, n, &computed) &&
-        core_first_not_finite(values, 0, (uint32_t)n) == n) {
-        for (size_t i = 0; i < n; i++) c->record[references[i]] = values[i];
-        c->stale = true;
-        return OK;
-    }
     for (size_t i = 0; i < n; i++) { /* all or nothing: check before the first write */
         const struct variable *v;
         uint32_t size = core_extent(references[i], whole, &v);
@@ -394,6 +401,19 @@ status core_set(struct instance *c, const uint32_t *references, size_t n, const 
         values += size;
     }
     if (n) c->stale = true;
+    return OK;
+}
+
+status core_set(struct instance *c, const uint32_t *references, size_t n, const double *values,
+                size_t n_values, bool whole, const char *function) {
+    bool computed;
+    if (whole || !references || !values || !(c->mode & RUNNING) ||
+        !all_below(model.zone[OUTPUT], references, n, &computed) ||
+        core_first_not_finite(values, 0, (uint32_t)n) < n)
+        return set_any(c, references, n, values, n_values, whole, function);
+    PLAIN_LOOP
+    for (size_t i = 0; i < n; i++) c->record[references[i]] = values[i];
+    c->stale = true;
     return OK;
 }
 
