@@ -372,7 +372,7 @@ class LinearContinuous(Continuous):
     hold_B = Local(0.0, "int e^(A s) ds [B, c], transposed", shape=("n_inputs_and_one", "n_states"))
     hold_x = Local(0.0, "states at t", shape="n_states")
     hold_u = Local(0.0, "inputs at t", shape="n_inputs_and_one")
-    hold_work = Local(0.0, "working memory of expm", shape=(7, "n_hold", "n_hold"))
+    hold_work = Local(0.0, "working memory of expm", shape=(4, "n_hold", "n_hold"))
 
     def advance(self, t: float, h: float) -> None:
         linear_hold(self, t, h)

@@ -167,7 +167,7 @@ class Tangle(Block):
     q = Output()
     r = Output()
     s = Output(shape=2)
-    work = Local(0.0, shape=(7, 2, 2))
+    work = Local(0.0, shape=(4, 2, 2))
     rows = Local(0.0, shape=(2, 1))
 
     def step(self, t, h):
