@@ -131,7 +131,7 @@ def _from_folder(name: str, source: _Source, folder: Path) -> Earthquake:
             raise RecordError(f"{pair[0]} has dt = {x.dt:g} s, {pair[1]} {y.dt:g} s; resample one of them")
         n = min(len(x.values), len(y.values))
         values = np.column_stack([x.values[:n], y.values[:n]])
-        return Earthquake(name, x.dt, values, f"{pair[0]}, {pair[1]}")
+        return Earthquake(name, x.dt, values, f"files {pair[0].name}, {pair[1].name}")
     raise RecordError(
         f"{folder} has no record {name}; put {name}.csv (t, x, y in g), {source.file}.csv, "
         f"or {name}_x.AT2 and {name}_y.AT2 there"
@@ -152,7 +152,7 @@ def _from_columns(name: str, path: Path) -> Earthquake:
     values = table[:, 1:] * G_BENCHMARK
     if t[0] > 0.5 * dt:  # the first value is at dt: at rest before
         values = np.vstack([np.zeros((round(t[0] / dt), 2)), values])
-    return Earthquake(name, float(f"{dt:.6g}"), values, str(path))
+    return Earthquake(name, float(f"{dt:.6g}"), values, f"file {path.name}")
 
 
 def _from_fema(name: str, source: _Source) -> Earthquake:

@@ -5,7 +5,8 @@ four bearings an abutment, piles under the columns and soil behind the abutments
 springs and dashpots. The frame is built from the sections below: a few nodes a span, the
 columns' lower part as segments with hinges. Same ports as the full model
 (benchmark_bridge.py): 16 bearings (x and y in turn), then the segments of both columns
-from top to base, each bending in y and in x; y and a are the midspan in x and y.
+from top to base, each bending in y and in x; y is the midspan in x and y, a the absolute
+acceleration there and at the deck's two ends.
 
     C = alpha M + beta K_frame + dashpots;  bearings and soil springs take no part
 """
@@ -72,11 +73,12 @@ def highway_bridge(*, late_events: bool = False, bisections: int = 5) -> Nonline
     elements = [*_bearings(frame), *_segments(frame, late_events)]
     for element in elements[:16]:
         K += element.k0 * element.rows.T @ element.rows
-    midspan = np.array([frame.row({("deck0", d): 1.0}) for d in ("ux", "uy")])
+    places = [f"deck{i}" for i in (0, -DECK_MEMBERS, DECK_MEMBERS)]
+    at = np.array([frame.row({(place, d): 1.0}) for place in places for d in ("ux", "uy")])
     actuators = np.vstack([e.rows for e in elements[:16]])
     return NonlinearStructure.build(
         M, C, K, frame.influence(), elements,
-        actuators=actuators, displacements=midspan, accelerations=midspan, bisections=bisections,
+        actuators=actuators, displacements=at[:2], accelerations=at, bisections=bisections,
     )  # fmt: skip
 
 

@@ -50,6 +50,19 @@ class Element:
     k0_coupling: float = 0.0  # of the two ends of a segment
 
 
+@dataclass(frozen=True)
+class LinearModel:
+    """M x'' + C x' + K x = actuators' u - M influence a_g, in an order of its own."""
+
+    M: Array  # (n)
+    C: Array  # (n, n)
+    K: Array  # (n, n)
+    influence: Array  # (n, n_g)
+    actuators: Array  # (n_u, n)
+    displacements: Array  # (n_y, n)
+    accelerations: Array  # (n_a, n)
+
+
 def bilinear(row: Array, k1: float, k2: float, dy: float) -> Element:
     """Bilinear with kinematic hardening: stiffness k1, k2 beyond the deformation dy."""
     return Element(laws.BILINEAR, np.atleast_2d(row), (k1, k2, dy), k1, dy)
@@ -272,3 +285,22 @@ class NonlinearStructure(Continuous):
             row_dof=dofs if len(dofs) else [0.0], row_value=weights if len(weights) else [0.0],
             kind=kind, law=table, k0=k0, k0_coupling=coupling, scale=scale, **values,
         )  # fmt: skip
+
+    def linear_model(self) -> LinearModel:
+        """The structure at its initial tangent, for the design of controllers."""
+        n = len(self.M)
+        start, entry = self.A_start.astype(int), self.A_row.astype(int)
+        column = np.repeat(np.arange(n), np.diff(start))
+        C, K = np.zeros((n, n)), np.zeros((n, n))
+        for A, values in ((C, self.C), (K, self.K)):
+            A[entry, column] = values
+            A[column, entry] = values
+        first = self.row_start.astype(int)
+        rows = np.zeros((len(first) - 1, n))
+        row = np.repeat(np.arange(len(first) - 1), np.diff(first))
+        rows[row, self.row_dof[: first[-1]].astype(int)] = self.row_value[: first[-1]]
+        parts = np.cumsum([len(self.k0), len(self.u), len(self.y)])
+        _, actuators, displacements, accelerations = np.split(rows, parts)
+        return LinearModel(
+            self.M.copy(), C, K, self.influence.T.copy(), actuators, displacements, accelerations
+        )

@@ -137,8 +137,9 @@ def test_full_model_reproduces_the_benchmark(name):
         np.abs(moments[:, 18::20] + moments[:, 19::20]).max(),
     )
     found = {
-        "Fb_N": max(shear) / 0.732, "Mb_Nm": np.abs(moments).max(), "phi_1pm": np.abs(curvatures(result)).max(),
-        "y_mid_m": np.abs(result["bridge.y"]).max(), "a_mid_ms2": np.abs(result["bridge.a"]).max(),
+        "Fb_N": max(shear) / 0.732, "Mb_Nm": np.abs(moments).max(), 
+        "phi_1pm": np.abs(curvatures(result)).max(),
+        "y_mid_m": np.abs(result["bridge.y"]).max(), "a_mid_ms2": np.abs(result["bridge.a"][:, :2]).max(),
         "y_bear_m": np.abs(result["bridge.deformation"][:, :16]).max(),
     }  # fmt: skip
     assert found == pytest.approx({k: peaks[k] for k in found}, rel=1e-4)
@@ -154,7 +155,7 @@ def test_located_events_differ_from_late_ones_as_much_as_one_step_overshoots(nam
     late, exact = full_model(name, late=True), full_model(name, late=False)
     for port, columns, bound in (
         ("y", slice(None), 0.02),
-        ("a", slice(None), 0.02),
+        ("a", slice(2), 0.02),
         ("force", slice(16, None), 0.02),
     ):
         a, b = (np.abs(r[f"bridge.{port}"][:, columns]).max() for r in (late, exact))

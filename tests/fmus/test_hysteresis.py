@@ -41,7 +41,7 @@ def test_bilinear_loop_has_the_corners_and_the_area_of_the_closed_form():
     assert out[1:, 3].sum() == pytest.approx(4 * q_y * (top - dy), rel=1e-12)  # a full loop
 
 
-@pytest.mark.parametrize("function, parameters", [
+@pytest.mark.parametrize(("function", "parameters"), [
     (law.bilinear, (5.0, 0.7, 0.4)),
     (law.friction, (5.0, 1.3)),
     (law.gap, (4.0, -0.3)),
