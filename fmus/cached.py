@@ -17,6 +17,7 @@ from cosim.fmu import FMU
 from cosim.participant import Participant
 
 from .export import export
+from .link import warm_up
 
 
 @lru_cache(maxsize=1)
@@ -32,6 +33,7 @@ def as_fmu(participant: Participant) -> FMU:
     digest = hashlib.sha256(_exporter() + kernel_key(participant).encode() + participant.memory.tobytes())
     path = cache_directory() / "fmus" / digest.hexdigest()[:32] / f"{type(participant).__name__}.fmu"
     if not path.exists():
+        warm_up()
         export(participant, path)
     fmu = FMU(path)
     fmu.source = participant

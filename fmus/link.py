@@ -20,6 +20,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import threading
 import uuid
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -236,15 +237,36 @@ def _compile(model: Model, platform: Platform, ir: str, headers: Path) -> bytes:
         arguments += [f"-I{headers}", f"-I{_FRONT_END}", f"--embed-dir={folder}"]
         arguments += [] if platform.suffix == ".dll" else ["-lm"]
         arguments += [folder / "model.c", folder / "kernels.ll", "-o", library]
-        zig = str(cache / "zig")
-        environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig}
-        done = subprocess.run(
-            [sys.executable, "-m", "ziglang", "cc", *map(str, arguments)],
-            capture_output=True, text=True, env=environment, cwd=folder, check=False,
-        )  # fmt: skip
+        done = _zig_cc(arguments, folder)
         if done.returncode or not library.exists():
             raise ExportError(_explain(model.identifier, platform, done.stderr))
         return library.read_bytes()
+
+
+def _zig_cc(arguments: list[str | Path], folder: Path) -> subprocess.CompletedProcess[str]:
+    zig = str(cache_directory() / "zig")
+    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig}
+    return subprocess.run(
+        [sys.executable, "-m", "ziglang", "cc", *map(str, arguments)],
+        capture_output=True, text=True, env=environment, cwd=folder, check=False,
+    )  # fmt: skip
+
+
+def warm_up() -> None:
+    """Let the compiler build its runtime for this machine, in the background, where it never ran before.
+
+    That is most of the time of a first link, and can pass while kernels are compiled.
+    """
+
+    def link_nothing() -> None:
+        with tempfile.TemporaryDirectory(dir=cache_directory()) as name:
+            source = Path(name) / "nothing.c"
+            source.write_text("double sin(double); double f(double x) { return sin(x); }\n")
+            arguments: list[str | Path] = ["-target", PLATFORMS[host()].target, *_FLAGS, source, "-lm"]
+            _zig_cc([*arguments, "-o", Path(name) / "nothing"], Path(name))
+
+    if not (cache_directory() / "zig").exists() and host() in PLATFORMS:
+        threading.Thread(target=link_nothing, daemon=True).start()
 
 
 def _unit(model: Model) -> str:
