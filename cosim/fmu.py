@@ -8,6 +8,7 @@ one port with a shape. Real, Integer and Boolean variables are ports.
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import weakref
@@ -17,6 +18,8 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .errors import FMUError, did_you_mean
 from .participant import Participant
@@ -79,6 +82,9 @@ class FMU:
                 raise FMUError(
                     f"{self.path.name} has no variable '{name}'" + did_you_mean(name, self.variables)
                 )
+        self.start_values()
+        if not isinstance(substeps, int) or substeps < 1:
+            raise FMUError(f"{self.path.name}: substeps={substeps!r} is no whole number, 1 or more")
         self.directory = _extracted(self.path)
         weakref.finalize(self, shutil.rmtree, str(self.directory), ignore_errors=True)
 
@@ -92,6 +98,26 @@ class FMU:
                 f"{self.path} has no binary for {platform} (it has: {', '.join(sorted(folders)) or 'none'}); "
                 "export it again for this platform, or with its sources"
             )
+
+    def start_values(self) -> dict[str, Any]:
+        """Return the start values that were given, by scalar variable; refuse what does not fit."""
+        groups = _group(self.variables.values())
+        found: dict[str, Any] = {}
+        for name, value in self.start.items():
+            port = groups[name] if name in groups else FMUPort(name, (), None, "", (self.variables[name],))
+            kind = port.variables[0].type
+            try:
+                values = [value] if kind == "String" else np.broadcast_to(value, port.shape).ravel().tolist()
+                fits = kind == "String" or all(float(v) == int(v) for v in values if kind != "Real")
+                fits = fits and (kind != "Boolean" or set(values) <= {0, 1})
+                fits = fits and (kind == "String" or all(math.isfinite(float(v)) for v in values))
+            except (TypeError, ValueError, OverflowError):
+                fits = False
+            if not fits:
+                shape = f" of shape {port.shape}" if port.shape else ""
+                raise FMUError(f"{self.path.name}: start value {name} = {value!r} is no {kind}{shape}")
+            found |= {v.name: one for v, one in zip(port.variables, values, strict=True)}
+        return found
 
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output port, the input ports on which it depends directly.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from contextlib import chdir
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -67,15 +68,22 @@ class FMUInstance:
         interface = fmu.description.modelExchange if model_exchange else fmu.description.coSimulation
         make = FMU2Model if model_exchange else FMU2Slave
         try:
-            self.api: Any = make(
-                guid=fmu.description.guid,
-                unzipDirectory=str(fmu.directory),
-                modelIdentifier=interface.modelIdentifier,
-                instanceName=name,
-            )
+            with chdir(
+                fmu.directory
+            ):  # FMPy goes to the library's folder and stays there when it does not load
+                self.api: Any = make(
+                    guid=fmu.description.guid,
+                    unzipDirectory=str(fmu.directory),
+                    modelIdentifier=interface.modelIdentifier,
+                    instanceName=name,
+                )
         except Exception as error:  # FMPy raises bare Exception when a library does not load
             raise FMUError(f"{name}: the binary of {fmu.path} cannot be loaded: {error}") from error
         self.running = False
+        #: what the call that ended the run returned; 3 is an error, 4 a fatal one
+        self.status = 0
+        #: the start values that were given, by scalar variable
+        self.start_values = fmu.start_values()
         self._instantiate()
         self.inputs = [_Exchange(t, _of(fmu.input_ports, t)) for t in ("Real", "Integer", "Boolean")]
         readable = {n: p for n, p in fmu.output_ports.items() if n in used}
@@ -125,11 +133,12 @@ class FMUInstance:
         self.running = True
         for exchange in self.inputs:
             for i, v in enumerate(exchange.variables):
-                exchange.values[i] = float(self.fmu.start.get(v.name, _start(v)))
+                exchange.values[i] = float(self.start_values.get(v.name, _start(v)))
         if self.model_exchange:
             self._discrete_states()
             api.enterContinuousTimeMode()
             self._get_states()
+            self._signs = self._indicator_signs()
 
     def _set_start(self) -> None:
         api = self.api
@@ -140,22 +149,17 @@ class FMUInstance:
             "Boolean": (api.setBoolean, bool),
             "String": (api.setString, str),
         }
-        for name, value in self.fmu.start.items():
-            variables = [self.fmu.variables[name]] if name in self.fmu.variables else self._elements(name)
-            values = [value] if len(variables) == 1 else np.broadcast_to(value, len(variables)).ravel()
-            for variable, one in zip(variables, values, strict=True):
-                setter, kind = setters[variable.type]
-                call = partial(setter, [variable.valueReference], [kind(one)])
-                self._try(f"set {variable.name} = {one}", call)
-
-    def _elements(self, name: str) -> list[Any]:
-        from .fmu import _group
-
-        return list(_group(self.fmu.variables.values())[name].variables)
+        for name, value in self.start_values.items():
+            variable = self.fmu.variables[name]
+            setter, kind = setters[variable.type]
+            call = partial(setter, [variable.valueReference], [kind(value)])
+            self._try(f"set {name} = {value}", call)
 
     def stop(self) -> None:
-        """Terminate and free the instance."""
-        if self.running:
+        """Terminate and free the instance; after a fatal error it must not be called any more."""
+        if self.status == 4:
+            return
+        if self.running and self.status < 3:
             try:
                 self.api.terminate()
             except Exception as error:  # the run is over; an FMU that cannot terminate is reported, not fatal
@@ -279,22 +283,23 @@ class FMUInstance:
 
     # -------------------------------------------------------------------------- events
 
-    _signs: Any = None
-
-    def _handle_events(self, t: float, h: float) -> None:
+    def _indicator_signs(self) -> Any:
         n = int(self.fmu.description.numberOfEventIndicators or 0)
         z = buffer(n)
-        self.api.getEventIndicators(z.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), n)
-        signs = z > 0
-        state_event = self._signs is not None and bool((signs != self._signs).any())
+        if n:
+            self.api.getEventIndicators(z.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), n)
+        return z > 0
+
+    def _handle_events(self, t: float, h: float) -> None:
+        signs = self._indicator_signs()
+        state_event = bool((signs != self._signs).any())
         time_event = t + 1e-9 * h >= self.event_time[0]
         if state_event or time_event or self.flags[0]:
             self.api.enterEventMode()
             self._discrete_states()
             self.api.enterContinuousTimeMode()
             self._get_states()
-            self.api.getEventIndicators(z.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), n)
-            signs = z > 0
+            signs = self._indicator_signs()
         self._signs = signs
         if self.flags[1]:
             raise FMUError(f"{self.name} asked to end the simulation at t = {t:g} s")
@@ -323,6 +328,9 @@ class FMUInstance:
             index = (address - exchange.values.ctypes.data) // 8
             if 0 <= index < len(exchange.variables):
                 return str(exchange.variables[index].name)
+        state = (address - self.state_address) // 8
+        if 0 <= state < self.n_states:
+            return str(self.fmu.description.derivatives[state].variable.derivative.name)
         return "?"
 
     def log(self) -> list[str]:

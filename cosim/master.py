@@ -24,6 +24,7 @@ import numpy as np
 from .compiler import load, lower_function
 from .errors import RecordError, SimulationError, TimeError, WiringError, did_you_mean
 from .fmu import FMU
+from .fmu_instance import FMUInstance
 from .instances import Failures
 from .opcodes import CALL, COMBINE, FMI2_VALUES, RECORD, TO_INT
 from .program import Program, steps_between
@@ -325,11 +326,13 @@ class _Run:
                 "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
             )
         else:
-            names = {1: "an exception in its kernel", 2: "fmi2Discard", 3: "fmi2Error", 4: "fmi2Fatal"}
-            text = (
-                f"{op.participant} failed at t = {t:g} s (step {k}) with {names.get(status, status)}; "
-                "run with jit=False to see where a kernel raises"
-            )
+            names = {2: "fmi2Discard", 3: "fmi2Error", 4: "fmi2Fatal"}
+            why = f"{names.get(status, f'status {status}')}; look at its inputs and at its log"
+            if isinstance(instance, FMUInstance):
+                instance.status = status
+            else:
+                why = "an exception in its kernel; run with jit=False to see where"
+            text = f"{op.participant} failed at t = {t:g} s (step {k}) with {why}"
         log = instance.log()[-8:]
         if log:
             text += "\n  log of the FMU:" + "".join(f"\n  {line}" for line in log)
