@@ -179,3 +179,69 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
     assert "Traceback" not in done.stderr
     with np.load(tmp_path / "out" / "result.npz") as data:
         assert 1 < len(data["time"]) < 400_000_000
+
+
+WRONG = {
+    # what is wrong: (text of the scenario, what stands there instead, what the error says)
+    "unknown port": ('("mass.v", "brake.v")', '("mass.w", "brake.v")', "mass has no output 'w'"),
+    "unknown participant": ('("mass.v", "brake.v")', '("mas.v", "brake.v")', "did you mean 'mass'"),
+    "incompatible unit": ('v = Input(unit="m/s")', 'v = Input(unit="kg")', "'m/s'"),
+    "rate that is no whole number": (
+        "Brake(b=b)",
+        "Brake(b=b, sample_period=0.025)",
+        "2.5 communication steps",
+    ),
+    "step of zero": ("step=0.01", "step=0.0", "above zero"),
+    "negative step": ("step=0.01", "step=-0.01", "above zero"),
+    "parameter out of bounds": ("Brake(b=b)", "Brake(b=-1.0)", "outside its bounds"),
+    "unknown parameter": ("Brake(b=b)", "Brake(bb=1.0)", "did you mean 'b'"),
+    "NaN from a block": ("-self.b * self.v", "self.v * float('nan')", "brake.F is not finite"),
+    "missing FMU": ("Mass()", "__import__('cosim').FMU('none.fmu')", "there is no file none.fmu"),
+    "missing record": ("Mass()", "__import__('cosim.records').records.read_at2('none.AT2')", "none.AT2"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_scenario_is_one_screen_and_exit_code_2(what, tmp_path, capsys):
+    right, wrong, expected = WRONG[what]
+    text = SCENARIO.replace(right, wrong)
+    assert text != SCENARIO
+    path = tmp_path / "wrong.py"
+    path.write_text(text)
+    message = refused(capsys, "run", path, "--out", tmp_path / "out")
+    assert expected in message
+
+
+def test_an_algebraic_cycle_is_printed_as_a_path(tmp_path, capsys):
+    path = tmp_path / "wrong.py"
+    text = SCENARIO.replace('Input(unit="m/s")', "Input()").replace(
+        '[("mass.v", "brake.v")', '[("b.F", "brake.v")'
+    )
+    path.write_text(
+        text.replace("Brake(b=b)}, ", 'Brake(b=b), "b": Brake()}, ').replace('"mass.F")]', '"b.v")]')
+    )
+    message = refused(capsys, "run", path, "--out", tmp_path / "out")
+    assert "algebraic cycle: " in message
+    assert "brake.F -> b.v" in message
+    assert "initial=" in message
+
+
+def test_unreadable_record_says_file_and_reason(tmp_path, capsys):
+    record = tmp_path / "broken.AT2"
+    record.write_text("PEER\nEl Centro\nacceleration\nNPTS= three, DT= often\n1 2 3\n")
+    path = tmp_path / "wrong.py"
+    path.write_text(
+        "from cosim.records import read_at2\n"
+        f"def build():\n    return read_at2({str(record)!r})\n"
+        "def run():\n    return build()\n"
+    )
+    assert "broken.AT2" in refused(capsys, "run", path, "--out", tmp_path / "out")
+
+
+def test_fmu_that_gives_nan_is_named_with_time(tmp_path, capsys):
+    path = tmp_path / "wrong.py"
+    root = SCENARIO.replace("self.F / 3.0", "(self.F / 3.0) ** 0.5")  # the braking force is negative: NaN
+    path.write_text(root.replace("Mass()", "__import__('fmus.cached').cached.as_fmu(Mass())"))
+    message = refused(capsys, "run", path, "--out", tmp_path / "out")
+    assert "mass" in message
+    assert "t = " in message
