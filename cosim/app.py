@@ -19,7 +19,6 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 from .errors import CosimError
-from .master import warm_up
 from .result import Result
 from .scenario import Scenario, load_scenario, scenario_names
 
@@ -44,7 +43,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _dispatch(tokens: list[str]) -> None:
     """Call a command; `run` and `table` take their options from the scenario that they name."""
     if len(tokens) > 1 and tokens[0] in ("run", "table") and not tokens[1].startswith("-"):
-        warm_up()
         scenario = load_scenario(tokens[1])
         app = App(name=f"cosim {tokens[0]} {scenario.name}", result_action="return_value")
         app.default(_run_command(scenario) if tokens[0] == "run" else _table_command(scenario))

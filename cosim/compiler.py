@@ -10,7 +10,6 @@ function they call, layout of the record, versions).
 from __future__ import annotations
 
 import hashlib
-import importlib
 import os
 import re
 import sys
@@ -190,14 +189,10 @@ def _without_python(dispatcher: Any) -> Any:
     return dispatcher
 
 
-def _llvm_type(numba_type: Any) -> str:
-    return {"float64": "double", "int64": "i64", "int32": "i32"}.get(str(numba_type), "ptr")
+def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...]) -> str:
+    """Compile a kernel of (record, then up to two times); return IR of `i32 name(ptr, double, double)`.
 
-
-def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...], arguments: list[str]) -> str:
-    """Compile one function; return IR that defines `i32 name(arguments)`.
-
-    It gives what the function returned, 0 for None, or Numba's code of the exception that was raised.
+    It gives 0, or Numba's code of the exception that was raised.
     """
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.errors import NumbaError
@@ -212,33 +207,25 @@ def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...], arguments: li
             "array to a declared variable is such a one; use assign(x, self.y) or a loop"
         ) from error
     compiled = dispatcher.overloads[signature]
-    if arguments[0].endswith(" self") and str(compiled.signature.return_type) != "none":
-        kind = compiled.signature.return_type
+    returned = str(compiled.signature.return_type)
+    if returned != "none":
         raise CompilationError(
-            f"{name} returns a value ({kind}); a kernel writes to self and returns nothing"
+            f"{name} returns a value ({returned}); a kernel writes to self and returns nothing"
         )
     with global_compiler_lock:
         compiled.library._ensure_finalized()
     inner = compiled.fndesc.llvm_func_name
-    types_ = ", ".join(_llvm_type(t) for t in signature)
-    named = ", ".join(f"{_llvm_type(t)} %a{i}" for i, t in enumerate(signature))
-    outer = ", ".join(f"{kind} %{argument}" for kind, argument in (a.split() for a in arguments))
-    for i, argument in enumerate(arguments[: len(signature)]):
-        named = named.replace(f"%a{i}", f"%{argument.split()[1]}")
+    given = ("ptr %self", "double %t", "double %h")
+    passed = ", ".join(given[: len(signature)])
     # Numba's convention: status f(return value *, exception **, arguments); -2 says "returned None"
     wrapper = f"""
-declare i32 @"{inner}"(ptr, ptr, {types_})
-define i32 @"{name}"({outer}) {{
+declare i32 @"{inner}"(ptr, ptr, {", ".join(a.split()[0] for a in given[: len(signature)])})
+define i32 @"{name}"({", ".join(given)}) {{
   %ret = alloca i64
   %exc = alloca ptr
-  store i64 0, ptr %ret
-  %status = call i32 @"{inner}"(ptr %ret, ptr %exc, {named})
+  %status = call i32 @"{inner}"(ptr %ret, ptr %exc, {passed})
   %none = icmp eq i32 %status, -2
-  %zero = icmp eq i32 %status, 0
-  %returned = or i1 %none, %zero
-  %wide = load i64, ptr %ret
-  %value = trunc i64 %wide to i32
-  %result = select i1 %returned, i32 %value, i32 %status
+  %result = select i1 %none, i32 0, i32 %status
   ret i32 %result
 }}
 """
@@ -322,7 +309,7 @@ def _lower_kernels(participant: Participant) -> str:
         signature = (record, *([numba.float64] * times))
         dispatcher = _jitted(kernel, participant.kernels, memo)
         try:
-            text = _lower(f"kernel_{name}", dispatcher, signature, ["ptr self", "double t", "double h"])
+            text = _lower(f"kernel_{name}", dispatcher, signature)
         except CompilationError as error:
             raise CompilationError(f"{type(participant).__name__}: {error}") from error
         module = llvm.parse_assembly(text)
@@ -331,24 +318,6 @@ def _lower_kernels(participant: Participant) -> str:
         else:
             linked.link_in(module)
     return str(linked)
-
-
-def lower_function(name: str, module: str, signature: str) -> str:
-    """Return LLVM IR with `i32 name(...)` for function `name` of a module of ours that is imported only now.
-
-    `signature` is Numba's, such as "i8,i8,f8".
-    """
-    source = [Path(__file__).with_name(f"{file}.py").read_bytes() for file in (module, "opcodes")]
-
-    def make() -> str:
-        from numba.core import sigutils
-
-        function = getattr(importlib.import_module(f"{__package__}.{module}"), name)
-        arguments, _ = sigutils.normalize_signature(f"({signature})")  # type: ignore[no-untyped-call]
-        kinds = [f"{_llvm_type(t)} a{i}" for i, t in enumerate(arguments)]
-        return _lower(name, _jitted(function, {}, {}), tuple(arguments), kinds)
-
-    return _cached(fingerprint({}, source, name, signature), make)
 
 
 # ----------------------------------------------------------------------- loading

@@ -127,7 +127,7 @@ def solve(A: Array, B: Array) -> None:
 
 
 def balance(A: Array, d: Array) -> None:
-    """Make rows and columns of A alike in size: A <- D^-1 A D, D = diag(d) of powers of two (Osborne 1960)."""
+    """A <- D^-1 A D with rows and columns of like size, D = diag(d) of powers of two (Osborne 1960)."""
     n = A.shape[0]
     fill(d, 1.0)
     for _ in range(10):

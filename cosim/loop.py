@@ -1,223 +1,473 @@
-"""The loop: one generic compiled program that runs every system.
+"""The loop: a system's operations (opcodes.py) as one native function, written in LLVM IR.
 
-A system is a table of operations (program.py). Each row has nine integers and five
-floats:
+The loop of a run is straight-line code, an operation after the other; what differs from
+run to run, the addresses, comes from a table of five words a row (function, a, b, c, d).
+So systems of one shape share one text, which is compiled once a process, in hundredths
+of a second and without Numba.
 
-    opcode, function, a, b, c, d, n, every, index | w0, w1, w2, w3, fraction
+    i32 run(ptr table, i64 k0, i64 k1, i64 last, double t0, double h, ptr report)
 
-`function` and a to d are addresses, `every` is the rate, `fraction` places the
-operation at t = t0 + (k + fraction) h. Rows [0, first) run at t_k, rows [first, rows)
-carry the system from t_k to t_{k+1} and are left out at the last point.
+runs the points k0 <= k < k1 of a system whose last point is `last`: at every point the
+first operations, at every point but the last the second ones as well, which carry the
+system to the next. An operation with `fraction` c runs at t = t0 + (k + c) h.
 
-This module needs Numba and is imported only when the loop has to be compiled.
+report: five int64, row and k where it stopped, status there, recorded rows, sampled
+points. It returns 0, or 1 when an operation failed; then the status is what the function
+returned, or -1 - i when value i is not finite.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import struct
+from collections.abc import Callable
 
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+from . import opcodes
+from .opcodes import Op
 
-from .opcodes import (
-    CALL,
-    COMBINE,
-    COPY,
-    FMI2_COMPLETED,
-    FMI2_DO_STEP,
-    FMI2_TIME,
-    FMI2_VALUES,
-    FMI2_VECTOR,
-    FMI3_DO_STEP,
-    FMI3_VALUES,
-    GATHER,
-    INTEGERS,
-    RECORD,
-    STATISTICS,
-    TO_FLOAT,
-    TO_INT,
-    WEIGHTS,
-)
+INLINE = 8  # up to so many floats an operation is written out, above it is a loop
 
-_NUMBA: dict[str, Any] = {"i4": types.int32, "i8": types.int64, "f8": types.float64}
-_LLVM = {"i4": ir.IntType(32), "i8": ir.IntType(64), "f8": ir.DoubleType()}
+_LIBRARY = """
+declare double @llvm.rint.f64(double)
+declare void @llvm.memmove.p0.p0.i64(ptr, ptr, i64, i1)
+
+; 1 + the index of the first NaN or infinity of n floats at x, or 0
+define internal i64 @nonfinite(ptr %x, i64 %n) {
+entry:
+  br label %loop
+loop:
+  %i = phi i64 [ 0, %entry ], [ %next, %more ]
+  %go = icmp slt i64 %i, %n
+  br i1 %go, label %look, label %fine
+look:
+  %p = getelementptr i64, ptr %x, i64 %i
+  %bits = load i64, ptr %p
+  %exponent = and i64 %bits, 9218868437227405312
+  %bad = icmp eq i64 %exponent, 9218868437227405312
+  %next = add i64 %i, 1
+  br i1 %bad, label %found, label %more
+more:
+  br label %loop
+found:
+  ret i64 %next
+fine:
+  ret i64 0
+}
+
+; y = scale x + offset
+define internal void @scale(ptr %x, ptr %y, i64 %n, double %scale, double %offset) {
+entry:
+  br label %loop
+loop:
+  %i = phi i64 [ 0, %entry ], [ %next, %body ]
+  %go = icmp slt i64 %i, %n
+  br i1 %go, label %body, label %end
+body:
+  %p = getelementptr double, ptr %x, i64 %i
+  %q = getelementptr double, ptr %y, i64 %i
+  %v = load double, ptr %p
+  %s = fmul double %v, %scale
+  %r = fadd double %s, %offset
+  store double %r, ptr %q
+  %next = add i64 %i, 1
+  br label %loop
+end:
+  ret void
+}
+
+; from each of n addresses to a row of floats
+define internal void @record(ptr %addresses, ptr %row, i64 %n) {
+entry:
+  br label %loop
+loop:
+  %i = phi i64 [ 0, %entry ], [ %next, %body ]
+  %go = icmp slt i64 %i, %n
+  br i1 %go, label %body, label %end
+body:
+  %p = getelementptr ptr, ptr %addresses, i64 %i
+  %source = load ptr, ptr %p
+  %v = load double, ptr %source
+  %q = getelementptr double, ptr %row, i64 %i
+  store double %v, ptr %q
+  %next = add i64 %i, 1
+  br label %loop
+end:
+  ret void
+}
+
+; minimum, maximum, sum and sum of squares of the floats at n addresses
+define internal void @watch(ptr %addresses, ptr %kept, i64 %n) {
+entry:
+  br label %loop
+loop:
+  %i = phi i64 [ 0, %entry ], [ %next, %body ]
+  %go = icmp slt i64 %i, %n
+  br i1 %go, label %body, label %end
+body:
+  %p = getelementptr ptr, ptr %addresses, i64 %i
+  %source = load ptr, ptr %p
+  %x = load double, ptr %source
+  %first = getelementptr [4 x double], ptr %kept, i64 %i
+  %low = load double, ptr %first
+  %lower = fcmp olt double %x, %low
+  %newlow = select i1 %lower, double %x, double %low
+  store double %newlow, ptr %first
+  %second = getelementptr i8, ptr %first, i64 8
+  %high = load double, ptr %second
+  %higher = fcmp ogt double %x, %high
+  %newhigh = select i1 %higher, double %x, double %high
+  store double %newhigh, ptr %second
+  %third = getelementptr i8, ptr %first, i64 16
+  %sum = load double, ptr %third
+  %newsum = fadd double %sum, %x
+  store double %newsum, ptr %third
+  %fourth = getelementptr i8, ptr %first, i64 24
+  %squares = load double, ptr %fourth
+  %square = fmul double %x, %x
+  %newsquares = fadd double %squares, %square
+  store double %newsquares, ptr %fourth
+  %next = add i64 %i, 1
+  br label %loop
+end:
+  ret void
+}
+
+define internal void @to_float(ptr %x, ptr %y, i64 %n) {
+entry:
+  br label %loop
+loop:
+  %i = phi i64 [ 0, %entry ], [ %next, %body ]
+  %go = icmp slt i64 %i, %n
+  br i1 %go, label %body, label %end
+body:
+  %p = getelementptr i32, ptr %x, i64 %i
+  %q = getelementptr double, ptr %y, i64 %i
+  %v = load i32, ptr %p
+  %r = sitofp i32 %v to double
+  store double %r, ptr %q
+  %next = add i64 %i, 1
+  br label %loop
+end:
+  ret void
+}
+
+; floats to int32; -1 - i if value i is none
+define internal i64 @to_int(ptr %x, ptr %y, i64 %n) {
+entry:
+  br label %loop
+loop:
+  %i = phi i64 [ 0, %entry ], [ %next, %fits ]
+  %go = icmp slt i64 %i, %n
+  br i1 %go, label %body, label %end
+body:
+  %p = getelementptr double, ptr %x, i64 %i
+  %q = getelementptr i32, ptr %y, i64 %i
+  %v = load double, ptr %p
+  %r = call double @llvm.rint.f64(double %v)
+  %whole = fcmp oeq double %r, %v
+  %above = fcmp oge double %v, -2147483648.0
+  %below = fcmp ole double %v, 2147483647.0
+  %range = and i1 %above, %below
+  %fit = and i1 %whole, %range
+  %next = add i64 %i, 1
+  br i1 %fit, label %fits, label %bad
+fits:
+  %integer = fptosi double %r to i32
+  store i32 %integer, ptr %q
+  br label %loop
+bad:
+  %status = xor i64 %i, -1
+  ret i64 %status
+end:
+  ret i64 0
+}
+"""
+
+_HEAD = """
+define i32 @run(ptr %table, i64 %k0, i64 %k1, i64 %last, double %t0, double %h, ptr %report) {
+entry:
+  %recorded = getelementptr i64, ptr %report, i64 3
+  %sampled = getelementptr i64, ptr %report, i64 4
+  br label %point
+point:
+  %k = phi i64 [ %k0, %entry ], [ %knext, %nextpoint ]
+  %go = icmp slt i64 %k, %k1
+  br i1 %go, label %begin, label %done
+begin:
+  %kf = sitofp i64 %k to double
+"""
 
 
-def _caller(*kinds: str) -> Any:
-    """Return a function that calls the C function `i32 f(kinds...)` at an address."""
+class _Writer:
+    """Writes the operations of one system; `failures` are the ways into the block that reports."""
 
-    @intrinsic
-    def call(typing_context: Any, address: Any, values: Any) -> Any:
-        arguments = types.Tuple([_NUMBA[k] for k in kinds])  # type: ignore[no-untyped-call]
-        signature = types.int32(types.int64, arguments)
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.count = 0
+        self.row = 0
+        self.block = "begin"
+        self.failures: list[tuple[str, int, str]] = []
 
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            function = ir.FunctionType(_LLVM["i4"], [_LLVM[k] for k in kinds])
-            pointer = builder.inttoptr(values[0], function.as_pointer())
-            return builder.call(pointer, [builder.extract_value(values[1], i) for i in range(len(kinds))])
+    def value(self, expression: str) -> str:
+        """Write `%n = expression` and return %n."""
+        self.count += 1
+        self.lines.append(f"  %v{self.count} = {expression}")
+        return f"%v{self.count}"
 
-        return signature, generate
+    def start_block(self, name: str) -> None:
+        """Begin a block; the one before must have ended with a branch."""
+        self.lines.append(f"{name}:")
+        self.block = name
 
-    return call
+    def label(self) -> str:
+        """Return a new block name."""
+        self.count += 1
+        return f"b{self.count}"
+
+    def word(self, index: int) -> str:
+        """Load an operand of the current row: 0 function, 1 a, 2 b, 3 c, 4 d; as a pointer."""
+        place = self.value(f"getelementptr i64, ptr %table, i64 {5 * self.row + index}")
+        return self.value(f"load ptr, ptr {place}")
+
+    def at(self, base: str, i: int) -> str:
+        """Return the address of float i at a pointer."""
+        return base if i == 0 else self.value(f"getelementptr double, ptr {base}, i64 {i}")
+
+    def time(self, fraction: float) -> str:
+        """Return t0 + (k + fraction) h."""
+        k = "%kf" if fraction == 0.0 else self.value(f"fadd double %kf, {number(fraction)}")
+        return self.value(f"fadd double %t0, {self.value(f'fmul double {k}, %h')}")
+
+    def check(self, status: str) -> None:
+        """Go on if the i64 status is 0, report it otherwise."""
+        good, on = self.value(f"icmp eq i64 {status}, 0"), self.label()
+        self.lines.append(f"  br i1 {good}, label %{on}, label %failed")
+        self.failures.append((self.block, self.row, status))
+        self.start_block(on)
+
+    def check_fmi(self, status: str) -> None:
+        """Go on after OK and Warning."""
+        bad = self.value(f"icmp sgt i32 {status}, 1")
+        self.check(self.value(f"sext i32 {self.value(f'select i1 {bad}, i32 {status}, i32 0')} to i64"))
+
+    def check_finite(self, address: str, n: int) -> None:
+        """Report the first of n floats that is not finite; look closer only if there is one."""
+        if n == 0:
+            return
+        on, slow = self.label(), self.label()
+        if n <= INLINE:
+            any_bad = ""
+            for i in range(n):
+                bits = self.value(f"load i64, ptr {self.at(address, i)}")
+                exponent = self.value(f"and i64 {bits}, {0x7FF0000000000000}")
+                bad = self.value(f"icmp eq i64 {exponent}, {0x7FF0000000000000}")
+                any_bad = self.value(f"or i1 {any_bad}, {bad}") if any_bad else bad
+            self.lines.append(f"  br i1 {any_bad}, label %{slow}, label %{on}")
+            self.start_block(slow)
+        found = self.value(f"call i64 @nonfinite(ptr {address}, i64 {n})")
+        self.check(self.value(f"sub i64 0, {found}"))
+        if n <= INLINE:
+            self.lines.append(f"  br label %{on}")
+            self.start_block(on)
+
+    def call(self, kinds: str, *arguments: str) -> str:
+        """Call the row's function with typed arguments; return its i32 status."""
+        function = self.word(0)
+        typed = ", ".join(f"{kind} {a}" for kind, a in zip(kinds.split(), arguments, strict=True))
+        return self.value(f"call i32 {function}({typed})")
 
 
-def _loader(kind: str) -> Any:
-    @intrinsic
-    def load(typing_context: Any, address: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return builder.load(builder.inttoptr(values[0], _LLVM[kind].as_pointer()))
-
-        return _NUMBA[kind](types.int64), generate
-
-    return load
+def number(x: float) -> str:
+    """Return a float as LLVM reads it exactly."""
+    return f"0x{struct.unpack('<Q', struct.pack('<d', x))[0]:016X}"
 
 
-def _storer(kind: str) -> Any:
-    @intrinsic
-    def store(typing_context: Any, address: Any, value: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            builder.store(values[1], builder.inttoptr(values[0], _LLVM[kind].as_pointer()))
-            return context.get_dummy_value()
-
-        return types.void(types.int64, _NUMBA[kind]), generate
-
-    return store
+# ------------------------------------------------------------------------------ operations
 
 
-call_kernel = _caller("i8", "f8", "f8")  # status = kernel(record, t, h)
-call_do_step = _caller("i8", "f8", "f8", "i4")  # fmi2DoStep(c, t, h, noSetFMUStatePriorToCurrentPoint)
-call_values = _caller("i8", "i8", "i8", "i8")  # fmi2GetReal(c, vr, n, values) and the like
-call_time = _caller("i8", "f8")  # fmi2SetTime(c, t), fmi3SetTime
-call_vector = _caller("i8", "i8", "i8")  # fmi2SetContinuousStates(c, x, n) and the like
-call_completed = _caller("i8", "i4", "i8", "i8")  # fmi2CompletedIntegratorStep(c, noSet, *enter, *terminate)
-call_values3 = _caller("i8", "i8", "i8", "i8", "i8")  # fmi3GetFloat64(c, vr, n, values, nValues)
-call_do_step3 = _caller("i8", "f8", "f8", "i4", "i8", "i8", "i8", "i8")  # fmi3DoStep
-EXPONENT = 0x7FF0000000000000  # of a float64: all ones in NaN and infinity only
-load_i4, load_i8, load_f8 = _loader("i4"), _loader("i8"), _loader("f8")
-store_i4, store_i8, store_f8 = _storer("i4"), _storer("i8"), _storer("f8")
+def _copy(w: _Writer, op: Op) -> None:
+    scale, offset = op.weights or (1.0, 0.0)
+    a, b = w.word(1), w.word(2)
+    if (scale, offset) != (1.0, 0.0):
+        factors = f"double {number(scale)}, double {number(offset)}"
+        w.lines.append(f"  call void @scale(ptr {a}, ptr {b}, i64 {op.n}, {factors})")
+    elif op.n > INLINE:
+        w.lines.append(f"  call void @llvm.memmove.p0.p0.i64(ptr {b}, ptr {a}, i64 {8 * op.n}, i1 false)")
+    else:
+        for i in range(op.n):
+            x = w.value(f"load double, ptr {w.at(a, i)}")
+            w.lines.append(f"  store double {x}, ptr {w.at(b, i)}")
 
 
-def nonfinite(address: int, n: int) -> int:
-    """Return 1 + the index of the first NaN or infinity of n floats, or 0."""
-    for i in range(n):
-        if load_i8(address + 8 * i) & EXPONENT == EXPONENT:
-            return i + 1
-    return 0
+def _call(w: _Writer, op: Op) -> None:
+    # a block that acts at every so many points has a step of its own
+    step = "%h" if op.every == 1 else w.value(f"fmul double %h, {number(float(op.every))}")
+    status = w.call("ptr double double", w.word(1), w.time(op.fraction), step)
+    w.check(w.value(f"sext i32 {status} to i64"))
+    w.check_finite(w.word(2), op.n)
 
 
-def fmi_status(status: int) -> int:
-    """Return 0 for OK and Warning, otherwise the status: 2 Discard, 3 Error, 4 Fatal."""
-    return 0 if status <= 1 else status
+def _record(w: _Writer, op: Op) -> None:
+    rows = w.value("load i64, ptr %recorded")
+    offset = w.value(f"mul i64 {rows}, {op.n}")
+    row = w.value(f"getelementptr double, ptr {w.word(2)}, i64 {offset}")
+    addresses = w.word(1)
+    if op.n > INLINE:
+        w.lines.append(f"  call void @record(ptr {addresses}, ptr {row}, i64 {op.n})")
+    for i in range(op.n if op.n <= INLINE else 0):
+        source = w.value(f"load ptr, ptr {w.at(addresses, i)}")
+        w.lines.append(f"  store double {w.value(f'load double, ptr {source}')}, ptr {w.at(row, i)}")
+    w.lines.append(f"  store i64 {w.value(f'add i64 {rows}, 1')}, ptr %recorded")
 
 
-def run(
-    table: int,
-    weights: int,
-    first: int,
-    rows: int,
-    k0: int,
-    k1: int,
-    last: int,
-    t0: float,
-    h: float,
-    report: int,
-) -> int:
-    """Run the points k0 <= k < k1 of a system whose last point is `last`.
+def _statistics(w: _Writer, op: Op) -> None:
+    addresses, kept = w.word(1), w.word(2)
+    if op.n > INLINE:
+        w.lines.append(f"  call void @watch(ptr {addresses}, ptr {kept}, i64 {op.n})")
+    for i in range(op.n if op.n <= INLINE else 0):
+        x = w.value(f"load double, ptr {w.value(f'load ptr, ptr {w.at(addresses, i)}')}")
+        for j, better in enumerate(("olt", "ogt")):
+            old = w.value(f"load double, ptr {w.at(kept, 4 * i + j)}")
+            new = w.value(
+                f"select i1 {w.value(f'fcmp {better} double {x}, {old}')}, double {x}, double {old}"
+            )
+            w.lines.append(f"  store double {new}, ptr {w.at(kept, 4 * i + j)}")
+        for j, term in ((2, x), (3, w.value(f"fmul double {x}, {x}"))):
+            total = w.value(f"fadd double {w.value(f'load double, ptr {w.at(kept, 4 * i + j)}')}, {term}")
+            w.lines.append(f"  store double {total}, ptr {w.at(kept, 4 * i + j)}")
+    points = w.value("load i64, ptr %sampled")
+    w.lines.append(f"  store i64 {w.value(f'add i64 {points}, 1')}, ptr %sampled")
 
-    report (5,) int64: row and k where it stopped, status there, recorded rows, sampled
-    points. Returns 0, or 1 when an operation failed (status: what the function
-    returned, or -1 - i when value i is not finite).
-    """
-    for k in range(k0, k1):
-        count = rows if k < last else first
-        for row in range(count):
-            op = table + 8 * INTEGERS * row
-            every = load_i8(op + 56)
-            if every != 1 and k % every != 0:
-                continue
-            code = load_i8(op)
-            function, a, b, c = load_i8(op + 8), load_i8(op + 16), load_i8(op + 24), load_i8(op + 32)
-            n = load_i8(op + 48)
-            w = weights + 8 * WEIGHTS * row
-            status = 0
-            if code == GATHER:
-                for i in range(n):
-                    store_f8(load_i8(a + 16 * i + 8), load_f8(load_i8(a + 16 * i)))
-            elif code == COPY:
-                scale, offset = load_f8(w), load_f8(w + 8)
-                if scale == 1.0 and offset == 0.0:
-                    for i in range(n):
-                        store_f8(b + 8 * i, load_f8(a + 8 * i))
-                else:
-                    for i in range(n):
-                        store_f8(b + 8 * i, load_f8(a + 8 * i) * scale + offset)
-            elif code == CALL:
-                # a block that acts at every so many points has a step of its own
-                status = call_kernel(function, (a, t0 + (k + load_f8(w + 32)) * h, h * every))
-                if status == 0 and n > 0:
-                    status = -nonfinite(b, n)
-            elif code == FMI2_VALUES:
-                status = fmi_status(call_values(function, (a, b, n, c)))
-                d = load_i8(op + 40)
-                if status == 0 and d > 0:
-                    status = -nonfinite(c, n)
-            elif code == FMI2_DO_STEP:
-                status = fmi_status(call_do_step(function, (a, t0 + (k + load_f8(w + 32)) * h, h, 1)))
-            elif code == RECORD:
-                recorded = load_i8(report + 24)
-                for i in range(n):
-                    store_f8(b + 8 * (recorded * n + i), load_f8(load_i8(a + 8 * i)))
-                store_i8(report + 24, recorded + 1)
-            elif code == STATISTICS:
-                for i in range(n):
-                    x = load_f8(load_i8(a + 8 * i))
-                    s = b + 32 * i
-                    store_f8(s, min(load_f8(s), x))
-                    store_f8(s + 8, max(load_f8(s + 8), x))
-                    store_f8(s + 16, load_f8(s + 16) + x)
-                    store_f8(s + 24, load_f8(s + 24) + x * x)
-                store_i8(report + 32, load_i8(report + 32) + 1)
-            elif code == COMBINE:
-                w0, w1, w2, w3 = load_f8(w), load_f8(w + 8), load_f8(w + 16), load_f8(w + 24)
-                for i in range(n):
-                    slope = w0 * load_f8(b + 8 * i)
-                    if w1 != 0.0:
-                        slope += w1 * load_f8(b + 8 * (n + i))
-                    if w2 != 0.0:
-                        slope += w2 * load_f8(b + 8 * (2 * n + i))
-                    if w3 != 0.0:
-                        slope += w3 * load_f8(b + 8 * (3 * n + i))
-                    store_f8(c + 8 * i, load_f8(a + 8 * i) + h * slope)
-                status = -nonfinite(c, n)
-            elif code == FMI2_TIME:
-                status = fmi_status(call_time(function, (a, t0 + (k + load_f8(w + 32)) * h)))
-            elif code == FMI2_VECTOR:
-                status = fmi_status(call_vector(function, (a, b, n)))
-            elif code == FMI2_COMPLETED:
-                status = fmi_status(call_completed(function, (a, 1, b, b + 4)))
-                t = t0 + (k + load_f8(w + 32)) * h
-                due = t + 1e-9 * h >= load_f8(load_i8(op + 40))
-                if status == 0 and (due or load_i4(b) + load_i4(b + 4) != 0):
-                    status = call_kernel(c, (0, t, h))
-            elif code == FMI3_VALUES:
-                status = fmi_status(call_values3(function, (a, b, n, c, load_i8(op + 40))))
-            elif code == FMI3_DO_STEP:
-                t = t0 + (k + load_f8(w + 32)) * h
-                status = fmi_status(call_do_step3(function, (a, t, h, 1, b, b + 4, b + 8, b + 16)))
-            elif code == TO_FLOAT:
-                for i in range(n):
-                    store_f8(b + 8 * i, load_i4(a + 4 * i) * 1.0)
-            elif code == TO_INT:
-                for i in range(n):
-                    value = load_f8(a + 8 * i)
-                    rounded = round(value)
-                    if rounded != value:
-                        status = -1 - i
-                    store_i4(b + 4 * i, types.int32(rounded))
-            if status != 0:
-                store_i8(report, row)
-                store_i8(report + 8, k)
-                store_i8(report + 16, status)
-                return 1
-    return 0
+
+def _combine(w: _Writer, op: Op) -> None:
+    """c = a + h sum_i w_i b_i, a loop over the vectors; weights of 0 are left out."""
+    a, b, c = w.word(1), w.word(2), w.word(3)
+    before, loop, body, end = w.block, w.label(), w.label(), w.label()
+    w.lines.append(f"  br label %{loop}")
+    w.start_block(loop)
+    w.count += 1
+    i, following = f"%i{w.count}", f"%j{w.count}"
+    w.lines.append(f"  {i} = phi i64 [ 0, %{before} ], [ {following}, %{body} ]")
+    w.lines.append(f"  br i1 {w.value(f'icmp slt i64 {i}, {op.n}')}, label %{body}, label %{end}")
+    w.start_block(body)
+    slope = ""
+    for stage, weight in enumerate(op.weights):
+        if weight != 0.0:
+            index = w.value(f"add i64 {i}, {stage * op.n}")
+            x = w.value(f"load double, ptr {w.value(f'getelementptr double, ptr {b}, i64 {index}')}")
+            term = w.value(f"fmul double {x}, {number(weight)}")
+            slope = w.value(f"fadd double {slope}, {term}") if slope else term
+    start = w.value(f"load double, ptr {w.value(f'getelementptr double, ptr {a}, i64 {i}')}")
+    moved = w.value(f"fadd double {start}, {w.value(f'fmul double %h, {slope}')}") if slope else start
+    w.lines.append(f"  store double {moved}, ptr {w.value(f'getelementptr double, ptr {c}, i64 {i}')}")
+    w.lines.append(f"  {following} = add i64 {i}, 1")
+    w.lines.append(f"  br label %{loop}")
+    w.start_block(end)
+    w.check_finite(c, op.n)
+
+
+def _to_float(w: _Writer, op: Op) -> None:
+    w.lines.append(f"  call void @to_float(ptr {w.word(1)}, ptr {w.word(2)}, i64 {op.n})")
+
+
+def _to_int(w: _Writer, op: Op) -> None:
+    w.check(w.value(f"call i64 @to_int(ptr {w.word(1)}, ptr {w.word(2)}, i64 {op.n})"))
+
+
+def _gather(w: _Writer, op: Op) -> None:
+    pairs = w.word(1)
+    for i in range(op.n):
+        source = w.value(f"load ptr, ptr {w.at(pairs, 2 * i)}")
+        target = w.value(f"load ptr, ptr {w.at(pairs, 2 * i + 1)}")
+        w.lines.append(f"  store double {w.value(f'load double, ptr {source}')}, ptr {target}")
+
+
+def _fmi2_values(w: _Writer, op: Op) -> None:
+    values = w.word(3)
+    w.check_fmi(w.call("ptr ptr i64 ptr", w.word(1), w.word(2), str(op.n), values))
+    w.check_finite(values, op.n if op.d else 0)
+
+
+def _fmi2_do_step(w: _Writer, op: Op) -> None:
+    w.check_fmi(w.call("ptr double double i32", w.word(1), w.time(op.fraction), "%h", "1"))
+
+
+def _fmi2_time(w: _Writer, op: Op) -> None:
+    w.check_fmi(w.call("ptr double", w.word(1), w.time(op.fraction)))
+
+
+def _fmi2_vector(w: _Writer, op: Op) -> None:
+    w.check_fmi(w.call("ptr ptr i64", w.word(1), w.word(2), str(op.n)))
+
+
+def _fmi2_completed(w: _Writer, op: Op) -> None:
+    flags = w.word(2)
+    second = w.value(f"getelementptr i32, ptr {flags}, i64 1")
+    w.check_fmi(w.call("ptr i32 ptr ptr", w.word(1), "1", flags, second))
+    t = w.time(op.fraction)
+    almost = w.value(f"fadd double {t}, {w.value(f'fmul double %h, {number(1e-9)}')}")
+    due = w.value(f"fcmp oge double {almost}, {w.value(f'load double, ptr {w.word(4)}')}")
+    either = w.value(f"or i32 {w.value(f'load i32, ptr {flags}')}, {w.value(f'load i32, ptr {second}')}")
+    asked = w.value(f"icmp ne i32 {either}, 0")
+    handle, on = w.label(), w.label()
+    w.lines.append(f"  br i1 {w.value(f'or i1 {due}, {asked}')}, label %{handle}, label %{on}")
+    w.start_block(handle)
+    status = w.value(f"call i32 {w.word(3)}(ptr null, double {t}, double %h)")
+    w.check(w.value(f"sext i32 {status} to i64"))
+    w.lines.append(f"  br label %{on}")
+    w.start_block(on)
+
+
+_WRITE: dict[int, Callable[[_Writer, Op], None]] = {
+    opcodes.COPY: _copy,
+    opcodes.CALL: _call,
+    opcodes.RECORD: _record,
+    opcodes.STATISTICS: _statistics,
+    opcodes.COMBINE: _combine,
+    opcodes.TO_FLOAT: _to_float,
+    opcodes.TO_INT: _to_int,
+    opcodes.GATHER: _gather,
+    opcodes.FMI2_VALUES: _fmi2_values,
+    opcodes.FMI2_DO_STEP: _fmi2_do_step,
+    opcodes.FMI2_TIME: _fmi2_time,
+    opcodes.FMI2_VECTOR: _fmi2_vector,
+    opcodes.FMI2_COMPLETED: _fmi2_completed,
+}
+
+
+def loop_ir(first: list[Op], second: list[Op]) -> str:
+    """Return the loop of a system as LLVM IR; the text is the same for systems of one shape."""
+    w = _Writer()
+    for op in first:
+        _operation(w, op)
+    w.lines.append("  %more = icmp slt i64 %k, %last\n  br i1 %more, label %carry, label %done")
+    w.start_block("carry")
+    for op in second:
+        _operation(w, op)
+    w.lines.append("  br label %nextpoint\nnextpoint:\n  %knext = add i64 %k, 1\n  br label %point")
+    w.lines.append("done:\n  ret i32 0")
+    if w.failures:
+        rows = ", ".join(f"[ {row}, %{block} ]" for block, row, _ in w.failures)
+        statuses = ", ".join(f"[ {status}, %{block} ]" for block, _, status in w.failures)
+        w.lines += ["failed:", f"  %row = phi i64 {rows}", f"  %status = phi i64 {statuses}"]
+        w.lines.append("  store i64 %row, ptr %report")
+        for place, name in ((1, "%k"), (2, "%status")):
+            w.lines.append(
+                f"  store i64 {name}, ptr {w.value(f'getelementptr i64, ptr %report, i64 {place}')}"
+            )
+        w.lines.append("  ret i32 1")
+    return "\n".join([_LIBRARY, _HEAD, *w.lines, "}"]) + "\n"
+
+
+def _operation(w: _Writer, op: Op) -> None:
+    """Write one operation, skipped at the points at which it is not due."""
+    on = w.label()
+    if op.every > 1:
+        due = w.value(f"icmp eq i64 {w.value(f'srem i64 %k, {op.every}')}, 0")
+        act = w.label()
+        w.lines.append(f"  br i1 {due}, label %{act}, label %{on}")
+        w.start_block(act)
+    _WRITE[op.code](w, op)
+    if op.every > 1:
+        w.lines.append(f"  br label %{on}")
+        w.start_block(on)
+    w.row += 1

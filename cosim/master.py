@@ -15,18 +15,17 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
 from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
 
-from .compiler import load, lower_function
+from .compiler import load
 from .errors import RecordError, SimulationError, TimeError, WiringError, did_you_mean
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures
-from .opcodes import CALL, COMBINE, FMI2_VALUES, RECORD, TO_INT
+from .opcodes import CALL, COMBINE, FMI2_VALUES, TO_INT
 from .program import Program, steps_between
 from .result import Result, Statistics
 from .system import Port, System, outputs_of
@@ -49,28 +48,12 @@ class Interrupted(KeyboardInterrupt):
         self.result = result
 
 
-_loop_lock = threading.Lock()
-
-
-def _loop() -> Callable[..., int]:
-    """Return the compiled loop; a second caller waits for the first."""
-    with _loop_lock:
-        return _compiled_loop()
-
-
-@lru_cache(maxsize=1)
-def _compiled_loop() -> Callable[..., int]:
-    address = load(lower_function("run", "loop", "i8,i8,i8,i8,i8,i8,i8,f8,f8,i8"))("run")
-    integer, real = ctypes.c_int64, ctypes.c_double
-    function: Callable[..., int] = ctypes.CFUNCTYPE(ctypes.c_int32, *[integer] * 7, real, real, integer)(
-        address
-    )
+def _compiled(ir: str) -> Callable[..., int]:
+    """Return the loop of a system as a function."""
+    integer, real, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+    kinds = (pointer, integer, integer, integer, real, real, pointer)
+    function: Callable[..., int] = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(ir)("run"))
     return function
-
-
-def warm_up() -> None:
-    """Compile the loop in a thread: worth it while an FMU is being linked, in a process of its own."""
-    threading.Thread(target=_loop, daemon=True).start()
 
 
 def simulate(
@@ -226,9 +209,8 @@ class _Run:
 
     def run(self, progress: Callable[[int, int], None] | None) -> Result:
         program = self.program
-        integers, floats = program.tables()
-        integers[integers[:, 0] == RECORD, 3] = self.data.ctypes.data
-        loop = _loop()
+        ir, table = program.loop(self.data)
+        loop = _compiled(ir)
         for instance in program.instances.values():
             instance.start(self.start)
             if program.failures.exception is not None:
@@ -240,10 +222,7 @@ class _Run:
                 until = min(done + chunk, self.steps + 1)
                 before = time.perf_counter()
                 failed = loop(
-                    integers.ctypes.data,
-                    floats.ctypes.data,
-                    program.n_first,
-                    len(integers),
+                    table.ctypes.data,
                     done,
                     until,
                     self.steps,

@@ -18,11 +18,6 @@ FMI2_DO_STEP = 11
 FMI2_TIME = 12
 FMI2_VECTOR = 13  # get or set the vector b of n floats (states, derivatives)
 FMI2_COMPLETED = 14  # b: int32 flags "enter event mode", "terminate"; one set, or time d due, calls c
-FMI3_VALUES = 20  # as FMI2_VALUES; d is the number of values
-FMI3_DO_STEP = 21  # b: three flags and the last successful time
-
-INTEGERS = 9
-WEIGHTS = 5
 
 
 @dataclass(frozen=True)
@@ -42,13 +37,9 @@ class Op:
     fraction: float = 0.0
     participant: str = ""
 
-    def integers(self, index: int) -> list[int]:
-        """Return the integer part of the row."""
-        return [self.code, self.function, self.a, self.b, self.c, self.d, self.n, self.every, index]
-
-    def floats(self) -> list[float]:
-        """Return the float part of the row."""
-        return [*self.weights, *[0.0] * (WEIGHTS - 1 - len(self.weights)), self.fraction]
+    def operands(self) -> tuple[int, int, int, int, int]:
+        """Return the words of the row: what differs between runs of one shape."""
+        return self.function, self.a, self.b, self.c, self.d
 
     def seconds(self, t0: float, k: int, h: float) -> float:
         """Return the time at which the row runs."""

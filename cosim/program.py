@@ -24,6 +24,7 @@ from .errors import TimeError, WiringError
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
+from .loop import loop_ir
 from .opcodes import COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
 from .participant import Block
 from .system import Connection, Port, System, cycle_text
@@ -322,13 +323,17 @@ class Program:
 
     # ------------------------------------------------------------------------- as text
 
-    def tables(self) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.int64]], Array]:
-        """Return the integer and the float part of the table; `rows` are its operations."""
+    def loop(self, data: Array) -> tuple[str, np.ndarray[tuple[int, int], np.dtype[np.int64]]]:
+        """Return the loop as LLVM IR and the table of its operands; recorded rows go to `data`.
+
+        `rows` are the operations as they stand in it.
+        """
         first = self._merged(self.first)
-        self.n_first = len(first)
-        self.rows = [*first, *self._merged(self.second)]
-        integers = np.array([op.integers(i) for i, op in enumerate(self.rows)], dtype=np.int64)
-        return integers.reshape(-1, 9), np.array([op.floats() for op in self.rows], dtype=np.float64)
+        first = [replace(op, b=data.ctypes.data) if op.code == RECORD else op for op in first]
+        second = self._merged(self.second)
+        self.rows = [*first, *second]
+        table = np.array([op.operands() for op in self.rows], dtype=np.int64)
+        return loop_ir(first, second), table
 
     def _merged(self, ops: list[Op]) -> list[Op]:
         """Join neighbouring copies of a few floats to one operation: less to look up for the loop."""
