@@ -229,7 +229,7 @@ class NonlinearStructure(Continuous):
         C: Array,
         K: Array,
         influence: Array,
-        elements: Sequence[Element],
+        elements: Sequence[Element] = (),
         *,
         actuators: Array | None = None,
         displacements: Array | None = None,
@@ -252,6 +252,7 @@ class NonlinearStructure(Continuous):
             cls = type(cls.__name__, (cls,), {"__doc__": cls.__doc__, "advance": _advance(law)})
         n = len(M)
         nothing = np.zeros((1, n))
+        elements = elements or [Element(laws.LINEAR, nothing, (0.0,), 0.0, 1.0)]
         element_rows = np.vstack([e.rows for e in elements])
         blocks = [
             element_rows,
