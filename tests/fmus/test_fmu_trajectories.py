@@ -194,6 +194,25 @@ def test_ecos_computes_the_same(fmu_of: Callable[..., Path], version: str) -> No
     assert relative(np.array([found]), held_from_start[None]) < EXACT
 
 
+def test_ecos_computes_the_same_building(fmu_of: Callable[..., Path]) -> None:
+    """Ground acceleration and a force on the second floor, from rest; FMI 2.0, where arrays are scalars."""
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    structure = EcosSimulationStructure()
+    structure.add_model("b", str(fmu_of("building", "2.0")))
+    simulation = EcosSimulation(step_size=H, structure=structure)
+    simulation.init(0.0)
+    simulation.set_real("b::ground_acceleration", 0.7)
+    simulation.set_real("b::force[2]", 5.0)
+    simulation.step(100)
+    names = [*(f"acceleration[{i}]" for i in (1, 2, 3)), "base_shear", *(f"x[{i}]" for i in (1, 2, 3))]
+    found = [simulation.get_real(f"b::{n}") for n in names]
+    simulation.terminate()
+    simulation.free()
+    u = np.tile([0.7, 0.0, 5.0, 0.0], (101, 1))
+    assert relative(np.array([found]), exact(linear_building(), np.zeros(6), u, H)[-1][None]) < EXACT
+
+
 def test_a_nonlinear_plant_is_that_of_the_kernels(host_of: Callable[[str], Host]) -> None:
     """Interpreted kernels and FMU over 300 steps: the same operations, but sin and pow may round apart."""
     h, kernel = host_of("root"), Root()
