@@ -10,6 +10,7 @@ import pytest
 
 from cosim import Result
 from cosim.earthquakes import earthquake
+from cosim.errors import SimulationError
 from fmus.highway_bridge import EI, M_Y, SEGMENT
 from scenarios import highway_bridge as study
 from scenarios._bridge_criteria import NAMES, WEIGHT, criteria, response
@@ -107,6 +108,17 @@ def test_search_records_are_not_the_judged_ones():
 
     assert len(SEARCH) == 3
     assert set(SEARCH) < set(earthquake.__globals__["NAMES"])
+
+
+def test_a_step_that_does_not_converge_is_told_with_element_time_and_residual():
+    """A tolerance below rounding cannot be met once a bearing yields."""
+    system = study.build(record="el-centro", controller="passive")
+    bridge = system.participants["bridge"]
+    bridge.tolerance, bridge.most_iterations = 1e-18, 1.0
+    with pytest.raises(
+        SimulationError, match=r"bridge: element \d+ did not converge .* t = \d+\.\d+ s, residual"
+    ):
+        study._simulate(system, "passive", 5.0, None)
 
 
 @pytest.mark.long
