@@ -96,6 +96,9 @@ class DampedTower(Continuous):
         )
         self.count = float(count)
         self.hold_step = 0.0
+        for i in range(count, self.roots.shape[0]):
+            for f in range(self.floors.shape[0] + 1):
+                self.out_re[i, f], self.out_im[i, f] = 0.0, 0.0
         for i in range(count):
             for dof in range(n):
                 re, im = 0.0, 0.0
@@ -113,7 +116,7 @@ class DampedTower(Continuous):
             self.w_seen[j] = math.nan
 
     def derivatives(self, t: float) -> None:
-        project_forces(self.w, self.w_seen, self.in_re, self.in_im, self.g_w)
+        project_forces(self.w, self.w_seen, self.in_re, self.in_im, int(self.count), self.g_w)
         n = self.w.shape[0]
         for i in range(int(self.count)):
             re, im = self.roots[i, 0], self.roots[i, 1]
@@ -128,16 +131,24 @@ class DampedTower(Continuous):
         last = self.out_re.shape[1] - 1
         for f in range(last + 1):
             self.sums[0, f], self.sums[1, f], self.sums[2, f] = 0.0, 0.0, 0.0
-        for i in range(int(self.count)):
-            x_re, x_im = self.z_re[i], self.z_im[i]
-            v_re, v_im = self.der_z_re[i], self.der_z_im[i]
-            a_re = self.roots[i, 0] * v_re - self.roots[i, 1] * v_im
-            a_im = self.roots[i, 1] * v_re + self.roots[i, 0] * v_im
+        for i in range(0, int(self.count), 2):  # two modes a pass; behind the last one all is zero
+            p_re, p_im = self.roots[i, 0], self.roots[i, 1]
+            q_re, q_im = self.roots[i + 1, 0], self.roots[i + 1, 1]
+            x_re, x_im, y_re, y_im = self.z_re[i], self.z_im[i], self.z_re[i + 1], self.z_im[i + 1]
+            v_re, v_im, w_re, w_im = (
+                self.der_z_re[i],
+                self.der_z_im[i],
+                self.der_z_re[i + 1],
+                self.der_z_im[i + 1],
+            )
+            a_re, a_im = p_re * v_re - p_im * v_im, p_im * v_re + p_re * v_im
+            b_re, b_im = q_re * w_re - q_im * w_im, q_im * w_re + q_re * w_im
             for f in range(last + 1):
-                re, im = self.out_re[i, f], self.out_im[i, f]
-                self.sums[0, f] += re * x_re - im * x_im
-                self.sums[1, f] += re * v_re - im * v_im
-                self.sums[2, f] += re * a_re - im * a_im
+                o_re, o_im = self.out_re[i, f], self.out_im[i, f]
+                s_re, s_im = self.out_re[i + 1, f], self.out_im[i + 1, f]
+                self.sums[0, f] += o_re * x_re - o_im * x_im + s_re * y_re - s_im * y_im
+                self.sums[1, f] += o_re * v_re - o_im * v_im + s_re * w_re - s_im * w_im
+                self.sums[2, f] += o_re * a_re - o_im * a_im + s_re * b_re - s_im * b_im
         for f in range(last):
             self.x[f], self.v[f], self.a[f] = self.sums[0, f], self.sums[1, f], self.sums[2, f]
         self.x_m, self.v_m, self.a_m = self.sums[0, last], self.sums[1, last], self.sums[2, last]
@@ -146,7 +157,7 @@ class DampedTower(Continuous):
         if h != self.hold_step:
             hold_factors(self.roots, int(self.count), h, self.hold)
             self.hold_step = h
-        project_forces(self.w, self.w_seen, self.in_re, self.in_im, self.g_w)
+        project_forces(self.w, self.w_seen, self.in_re, self.in_im, int(self.count), self.g_w)
         n = self.w.shape[0]
         for i in range(int(self.count)):
             g_re = self.g_w[0, i] + self.in_re[n, i] * self.u
@@ -178,7 +189,7 @@ class DampedTower(Continuous):
         )  # fmt: skip
 
 
-def project_forces(w: Array, seen: Array, in_re: Array, in_im: Array, g: Array) -> None:
+def project_forces(w: Array, seen: Array, in_re: Array, in_im: Array, count: int, g: Array) -> None:
     """g = phi' w, if w is not the w of the last time."""
     n = w.shape[0]
     same = True
@@ -188,14 +199,20 @@ def project_forces(w: Array, seen: Array, in_re: Array, in_im: Array, g: Array) 
             break
     if same:
         return
-    for i in range(g.shape[1]):
+    for i in range(count):
         g[0, i], g[1, i] = 0.0, 0.0
+    for j in range(0, n - 3, 4):  # four forces a pass, so that g is not loaded and stored for each
+        a, b, c, d = w[j], w[j + 1], w[j + 2], w[j + 3]
+        for i in range(count):
+            g[0, i] += in_re[j, i] * a + in_re[j + 1, i] * b + in_re[j + 2, i] * c + in_re[j + 3, i] * d
+        for i in range(count):
+            g[1, i] += in_im[j, i] * a + in_im[j + 1, i] * b + in_im[j + 2, i] * c + in_im[j + 3, i] * d
+    for j in range(n - n % 4, n):
+        for i in range(count):
+            g[0, i] += in_re[j, i] * w[j]
+            g[1, i] += in_im[j, i] * w[j]
     for j in range(n):
         seen[j] = w[j]
-        for i in range(g.shape[1]):
-            g[0, i] += in_re[j, i] * w[j]
-        for i in range(g.shape[1]):
-            g[1, i] += in_im[j, i] * w[j]
 
 
 def hold_factors(roots: Array, count: int, h: float, hold: Array) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,18 +17,19 @@ from scenarios._tower_criteria import (
 )
 
 Row = dict[str, Any]
-Runner = Callable[[list[Row]], list[dict[str, float]]]
+Runner = Callable[[list[Row]], list[dict[str, float] | None]]
 
 NOTES = """\
 Why, where it differs:
-  The load is a calibrated realisation, not the benchmark's record. J7, a single peak of floor 75 in
-  one gust, depends on the seed most: other seeds give 0.35 to 0.6.
+  The load is a calibrated realisation, not the benchmark's record, and 900 s are short for a mode
+  with 1 % damping: with seeds 0 to 11 LQG has J1 = 0.41 to 0.56 and J7 = 0.44 to 0.69. The default
+  seed was chosen for nearness to print (scenarios/_fit_wind.py); its J7, one peak, is what is left.
   The weights of the sliding surface are not printed. With those found here the motion on the surface
   does most of the work and a changes J1 to J4 by tenths of a per cent (printed: 1 to 4 %). J5 and J6
   then fall by up to 2 % with larger a, where 6 to 19 % more are printed: weights that raise them
   break "filtered below unfiltered", which was given precedence.
-  J6, J12, sigma_u and max_u are 1.2 to 2 times the print at dK = 0 and +15 %: the surface also acts
-  on the second mode, which this load excites."""
+  J6, J12, sigma_u and max_u are up to 2.2 times the print: force was not weighed against J1 to J4 and
+  the orderings. 12 % of the variance of the force is spent on the second mode."""
 
 _NEAR_PRINT = ("J1", "J2", "J3", "J4", "J7", "J8", "J9", "J10")
 _TOLERANCE = 0.15
@@ -47,12 +49,12 @@ def thesis(run_all: Runner, common: Row) -> list[Row]:
     rows = []
     for column in PRINTED:
         for i, error in enumerate(STIFFNESS_ERRORS):
-            found = next(computed)
+            found = next(computed) or {}
             rows += [
                 {
                     "table": column.table, "controller": column.controller, "a": column.a,
                     "stiffness_error": error, "criterion": name,
-                    "printed": column.printed[name][i], "computed": found[name],
+                    "printed": column.printed[name][i], "computed": found.get(name, math.nan),
                 }
                 for name in NAMES
             ]  # fmt: skip
@@ -172,10 +174,28 @@ BEYOND: dict[str, Row] = {
 }
 
 
+REMARKS = {
+    "realism": """\
+Filtered SMC, a = 1.065, one block at a time. Noise, quantisation, saturation and milliseconds of delay
+cost nothing that shows: the loop works below 1 Hz and its observer is slower than the sensors. What
+costs is a lag between command and force, which the observer does not know: an actuator of 50 ms
+raises the force more than everything else, and with noisy sensors on top of it acceleration.""",
+    "beyond": """\
+The gain laws of chapter 4 replace M = a|s| + delta in (2.15), 0.1 m/s2 to start with. They lower the
+accelerations by 1 % and take more force and stroke. Algorithm I falls to its floor within ten
+seconds, while the observer settles, and leaves s to the equivalent control; in Algorithm II and the
+gain by equivalent control the innovation of the observer keeps the gain at half its start.
+Actuator dynamics decide for the filter: unfiltered SMC takes the feedthrough of its own command out of
+the measured accelerations; with the force late by 20 ms (not by 5) that loop is unstable, unless the
+observer is given the force itself. The filter (2.17) keeps the command below the actuator's
+corner, and the same actuator costs next to nothing.""",
+}
+
+
 def _variants(study: str, cases: dict[str, Row], run_all: Runner) -> list[Row]:
     found = run_all(list(cases.values()))
     return [
-        {"study": study, "case": name, "criterion": criterion, "computed": result[criterion]}
+        {"study": study, "case": name, "criterion": criterion, "computed": result and result[criterion]}
         for name, result in zip(cases, found, strict=True)
         for criterion in NAMES
     ]
@@ -193,11 +213,14 @@ def beyond(run_all: Runner, common: Row) -> list[Row]:
 
 def _variants_text(rows: list[Row]) -> str:
     shown = ("J1", "J3", "J5", "J6", "J7", "J9", "J11", "J12", "sigma_u", "max_u", "max_xm")
-    cases: dict[str, dict[str, float]] = {}
+    cases: dict[str, dict[str, float | None]] = {}
     for row in rows:
         cases.setdefault(row["case"], {})[row["criterion"]] = row["computed"]
     lines = [f"{'':<34}" + "".join(f"{n:>9}" for n in shown)]
-    lines += [f"{case:<34}" + "".join(f"{c[n]:9.4g}" for n in shown) for case, c in cases.items()]
+    for case, c in cases.items():
+        cells = "   unstable" if c["J1"] is None else "".join(f"{c[n]:9.4g}" for n in shown)
+        lines.append(f"{case:<34}{cells}")
+    lines.append(REMARKS[rows[0]["study"]])
     return "\n".join(lines)
 
 

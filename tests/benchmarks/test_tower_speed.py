@@ -1,0 +1,129 @@
+"""The tall building's whole loop: plant FMU with 77 inputs, noise, observer, SMC, filter, 16 criteria.
+
+Compared in the same run, in microseconds a communication step of 1 ms, with
+
+    (a) the same loop written with FMPy's calls and NumPy
+    (b) the plant alone as dense updates x <- A_d x + B_d f, as scipy.signal.dlsim does them
+
+`pytest tests/benchmarks/test_tower_speed.py -s` prints the table.
+"""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import scipy.linalg as la
+from fmpy.fmi2 import FMU2Slave
+
+from controllers.condensation import first_order
+from cosim import FMU, simulate
+from fmus.tall_building import with_damper
+from scenarios import tall_building
+from scenarios._tower_criteria import FLOORS
+from scenarios._tower_design import SURFACE_WEIGHTS, tower_observer
+
+H = tall_building.PERIOD
+WATCHED = ["tower.x", "tower.a", "tower.x_m", "tower.u", "power.p"]
+
+
+def ours(span: float = 120.0) -> float:
+    """Best of three, us a step."""
+    system = tall_building.build()
+    simulate(system, step=H, stop=10 * H, record=[], statistics=WATCHED)  # compiles
+    runs = [simulate(system, step=H, stop=span, record=[], statistics=WATCHED) for _ in range(3)]
+    return min(r.seconds / r.steps for r in runs) * 1e6
+
+
+def by_hand(steps: int = 3000) -> float:
+    """The same with FMPy's calls and NumPy, us a step."""
+    plant = tall_building.build().participants["tower"]
+    assert isinstance(plant, FMU)
+    description = fmpy.read_model_description(plant.path)
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    inputs = [references[f"w[{i + 1}]"] for i in range(76)] + [references["u"]]
+    outputs = [references[f"{n}[{i + 1}]"] for n in "xva" for i in range(len(FLOORS))]
+    outputs += [references[n] for n in ("x_m", "v_m", "a_m")]
+    fmu = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(plant.path),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="tower",
+    )
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+
+    model = tall_building.model_of(None)
+    observer = tower_observer(model)
+    law = tall_building.SlidingMode.design(model, SURFACE_WEIGHTS.matrix(model))
+    A_d, B_d, L_d = observer.A_d.copy(), observer.B_d[:, 0].copy(), observer.L_d.copy()
+    P, PA, PB_inv = law.P[0].copy(), law.PA[0].copy(), float(law.PB_inv[0, 0])
+    table, dt = tall_building.load(None, tall_building.SEED, tall_building.DURATION, 76)
+    rng = np.random.default_rng(1)
+    approach = -np.expm1(-H / 0.1)
+    x_hat, u, u_f = np.zeros(12), 0.0, 0.0
+    peak, square, force = np.zeros(30), np.zeros(30), np.zeros(77)
+    began = time.perf_counter()
+    for k in range(steps):
+        y = np.array(fmu.getReal(outputs))
+        if k % 10 == 0:
+            i = int(k * H / dt + 1e-9)
+            force[:76] = table[i] + (k * H / dt - i) * (table[i + 1] - table[i])
+        measured = y[[18 + 2, 18 + 8, 29]] + 0.001 * rng.standard_normal(3)
+        x_hat = A_d @ x_hat + B_d * u_f + L_d @ measured
+        s = P @ x_hat
+        u_before = u
+        u = PB_inv * (-(PA @ x_hat) - (1.065 * abs(s) + 0.001) * np.sign(s))
+        u_f += approach * (u_before - u_f)
+        force[76] = u_f
+        peak = np.maximum(peak, np.abs(y))
+        square += y * y
+        fmu.setReal(inputs, force)
+        fmu.doStep(k * H, H)
+    seconds = time.perf_counter() - began
+    fmu.terminate()
+    fmu.freeInstance()
+    return seconds / steps * 1e6
+
+
+def dense(steps: int = 5000) -> float:
+    """The plant alone, dense, us a step."""
+    coupled = with_damper(tall_building.building())
+    A, n = first_order(coupled.M, coupled.C, coupled.K), coupled.dof
+    B = np.vstack([np.zeros((n, n)), la.inv(coupled.M)])
+    E = la.expm(np.block([[A * H, B * H], [np.zeros((n, 3 * n))]]))
+    A_d, B_d = E[: 2 * n, : 2 * n].copy(), E[: 2 * n, 2 * n :].copy()
+    C = np.vstack([np.eye(2 * n)[: 2 * n : 8], A[n : n + 10]])
+    forces = np.random.default_rng(2).normal(size=(steps, n))
+    x = np.zeros(2 * n)
+    began = time.perf_counter()
+    for f in forces:
+        C @ x
+        x = A_d @ x + B_d @ f
+    return (time.perf_counter() - began) / steps * 1e6
+
+
+def test_speed_of_the_whole_loop() -> None:
+    """10 us a step is the bound of the study; 14 times FMPy and NumPy was measured, on a shared machine."""
+    own, hand, plain = ours(), by_hand(), dense()
+    print(f"\nwhole loop {own:.2f} us/step; FMPy and NumPy {hand:.1f} ({hand / own:.0f} times); ", end="")
+    print(f"dense update of the plant alone {plain:.1f}")
+    assert own < 10.0
+    assert hand > 7.0 * own
+
+
+def test_memory_of_a_default_run() -> None:
+    """900 s, default recording, a process of its own: below 500 MB with imports and compiler."""
+    code = (
+        "import resource; from scenarios import tall_building; tall_building.run();"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    root = Path(__file__).parents[2]
+    found = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    megabytes = int(found.stdout.split()[-1]) / 1024
+    print(f"\npeak memory {megabytes:.0f} MB")
+    assert megabytes < 500.0
