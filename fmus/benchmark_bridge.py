@@ -48,5 +48,6 @@ def benchmark_bridge(
     at = np.eye(len(M))
     return NonlinearStructure.build(
         M, C, K, data["I1"], elements,
-        actuators=bearings, displacements=at[list(MIDSPAN)], accelerations=at[[*MIDSPAN, *ENDS]], bisections=bisections,
+        actuators=bearings, displacements=at[list(MIDSPAN)], accelerations=at[[*MIDSPAN, *ENDS]],
+        bisections=bisections,
     )  # fmt: skip

@@ -137,7 +137,7 @@ def test_full_model_reproduces_the_benchmark(name):
         np.abs(moments[:, 18::20] + moments[:, 19::20]).max(),
     )
     found = {
-        "Fb_N": max(shear) / 0.732, "Mb_Nm": np.abs(moments).max(), 
+        "Fb_N": max(shear) / 0.732, "Mb_Nm": np.abs(moments).max(),
         "phi_1pm": np.abs(curvatures(result)).max(),
         "y_mid_m": np.abs(result["bridge.y"]).max(), "a_mid_ms2": np.abs(result["bridge.a"][:, :2]).max(),
         "y_bear_m": np.abs(result["bridge.deformation"][:, :16]).max(),
