@@ -52,7 +52,19 @@ LQG_SENSORS = (0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 14, 15)
 MODES = 14
 NODES = 40  # the network's largest number
 UNMODELLED = 1e5  # N
-#: found by tests/benchmarks/search_scwnn.py on el-centro, northridge and chi-chi
+#: what tests/benchmarks/search_scwnn.py draws from, and the records it looks at
+SEARCH_SPACE = {
+    "k1": (30.0, 300.0),
+    "k2": (1.0, 300.0),
+    "g_min": (10.0, 300.0),
+    "s_max": (1.0, 100.0),
+    "eta_r": (0.1, 30.0),
+    "leak": (0.01, 3.0),
+    "eta_iw": (0.001, 0.1),
+    "eta_ib": (0.001, 0.1),
+}
+SEARCH_RECORDS = ("el-centro", "northridge", "chi-chi")
+#: what it found
 SEARCHED: dict[str, float] = {
     "k1": 40.8, "k2": 9.97, "g_min": 20.0, "s_max": 3.35,
     "eta_r": 7.22, "leak": 0.0495, "eta_iw": 0.00934, "eta_ib": 0.0915,

@@ -1,8 +1,8 @@
 """Search of network parameters: python tests/benchmarks/search_scwnn.py [FOLDER WITH BENCHMARK DATA]
 
-Declared beforehand: the space below, drawn at random (log-uniform, seed 1), 60 candidates; the
-records el-centro, northridge and chi-chi; the number to be lowered, the mean of J1 to J6 and J9 to
-J14 over these records. The other three records are looked at once, with the best candidate.
+Declared beforehand: SEARCH_SPACE in scenarios/_bridge_control.py, 60 candidates drawn at random
+(log-uniform, seed 1); SEARCH_RECORDS there; the number to be lowered, the mean of J1 to J6 and J9
+to J14 over these records. The other three records are looked at once, with the best candidate.
 What is found goes to SEARCHED in scenarios/_bridge_control.py.
 """
 
@@ -16,19 +16,9 @@ import numpy as np
 from cosim import simulate
 from cosim.earthquakes import NAMES, available, earthquake
 from scenarios import _bridge_control as control
+from scenarios._bridge_control import SEARCH_RECORDS, SEARCH_SPACE
 from scenarios._bridge_criteria import PORTS, criteria, response
 
-SPACE = {
-    "k1": (30.0, 300.0),
-    "k2": (1.0, 300.0),
-    "g_min": (10.0, 300.0),
-    "s_max": (1.0, 100.0),
-    "eta_r": (0.1, 30.0),
-    "leak": (0.01, 3.0),
-    "eta_iw": (0.001, 0.1),
-    "eta_ib": (0.001, 0.1),
-}
-SEARCH = ("el-centro", "northridge", "chi-chi")
 COUNTED = [f"J{i}" for i in (*range(1, 7), *range(9, 15))]
 
 
@@ -57,11 +47,14 @@ def main(data: Path | None) -> None:
         without[name] = response(run, quake.duration)
     rng = np.random.default_rng(1)
     candidates = [{}] + [
-        {k: float(np.exp(rng.uniform(*np.log(bounds)))) for k, bounds in SPACE.items()} for _ in range(60)
+        {k: float(np.exp(rng.uniform(*np.log(bounds)))) for k, bounds in SEARCH_SPACE.items()}
+        for _ in range(60)
     ]
     best, lowest = {}, np.inf
     for i, candidate in enumerate(candidates):
-        value = np.mean([judge(bridge, quakes[n], without[n], candidate) for n in SEARCH if n in here])
+        value = np.mean(
+            [judge(bridge, quakes[n], without[n], candidate) for n in SEARCH_RECORDS if n in here]
+        )
         if value < lowest:
             best, lowest = candidate, value
             print(i, f"{value:.4f}", {k: float(f"{v:.3g}") for k, v in candidate.items()}, flush=True)
@@ -70,7 +63,8 @@ def main(data: Path | None) -> None:
     for name in NAMES:
         if name in here:
             pair = [judge(bridge, quakes[name], without[name], p) for p in ({}, best)]
-            print(f"{name:15} {pair[0]:.4f} {pair[1]:.4f} {'searched on' if name in SEARCH else 'judged'}")
+            role = "searched on" if name in SEARCH_RECORDS else "judged"
+            print(f"{name:15} {pair[0]:.4f} {pair[1]:.4f} {role}")
     print(best)
 
 

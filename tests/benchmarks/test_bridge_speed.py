@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pytest
 import scipy.linalg as la
 
 from cosim import FMU, System, simulate
@@ -89,13 +88,3 @@ def test_fmu_with_network_is_faster_than_real_time(tmp_path, capsys):
     with capsys.disabled():
         print(f"\n{len(bridge.M)} DOF as FMU, with network: {100.0 / fmu.seconds:.0f} times real time")
     assert fmu.seconds < 5.0
-
-
-@pytest.mark.long
-def test_parameters_of_the_network_are_those_of_the_search():
-    """The search draws from a declared space; what it found lies within it."""
-    from tests.benchmarks.search_scwnn import SPACE
-
-    for name, value in control.SEARCHED.items():
-        low, high = SPACE[name]
-        assert low <= value <= high

@@ -13,8 +13,9 @@ from cosim import System, simulate
 from fmus import hysteresis as law
 from fmus.nonlinear_structure import NonlinearStructure, bilinear
 from fmus.opensees_model import opensees_model
-from tests.fmus.test_hysteresis import drive
-from tests.fmus.test_nonlinear_structure import Held
+
+from .test_hysteresis import drive
+from .test_nonlinear_structure import Held
 
 try:
     import openseespy.opensees as ops

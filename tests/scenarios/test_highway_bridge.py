@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from cosim import Result
-from cosim.earthquakes import earthquake
+from cosim.earthquakes import NAMES as RECORDS
 from cosim.errors import SimulationError
 from fmus.highway_bridge import EI, M_Y, SEGMENT
+from scenarios import _bridge_control as control
 from scenarios import highway_bridge as study
 from scenarios._bridge_criteria import NAMES, WEIGHT, criteria, response
 from scenarios._bridge_printed import printed
@@ -103,11 +104,13 @@ def test_figures():
     assert len(found["figure-3.7-second-sensor"].axes[0].lines) == 3
 
 
-def test_search_records_are_not_the_judged_ones():
-    from tests.benchmarks.search_scwnn import SEARCH
-
-    assert len(SEARCH) == 3
-    assert set(SEARCH) < set(earthquake.__globals__["NAMES"])
+def test_searched_parameters_are_from_the_declared_space_and_three_records():
+    assert len(control.SEARCH_RECORDS) == 3
+    assert set(control.SEARCH_RECORDS) < set(RECORDS)
+    assert control.SEARCHED.keys() == control.SEARCH_SPACE.keys()
+    for name, value in control.SEARCHED.items():
+        low, high = control.SEARCH_SPACE[name]
+        assert low <= value <= high
 
 
 def test_a_step_that_does_not_converge_is_told_with_element_time_and_residual():
