@@ -15,9 +15,10 @@ and order (notes below the table).
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
+from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -452,23 +453,27 @@ def run_all(
 ) -> list[dict[str, float] | None]:
     """Criteria of several runs, None for one that diverges.
 
-    In parallel: the compiled loop works without the interpreter's lock.
+    In processes, not threads: FMPy changes the working directory, which all threads share,
+    while it loads a library.
     """
     for options in {str(c.get("controller")) + str(sorted(c)): c for c in cases}.values():
-        run(**{**common, **options, "duration": 10 * PERIOD}, record=False)  # compile one after another
-    reference(**{k: common[k] for k in ("data", "wind", "seed", "duration")})
+        run(**{**common, **options, "duration": 10 * PERIOD}, record=False)  # compile once, for all
+    count = workers or os.cpu_count() or 1
+    if count == 1:
+        return [_criteria_of(common | options) for options in cases]
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        return list(pool.map(_criteria_of, [common | options for options in cases]))
 
-    def one(options: dict[str, Any]) -> dict[str, float] | None:
-        try:
-            found = values(run(**common, **options, record=False))
-        except SimulationError as error:
-            if "not finite" in str(error):
-                return None
-            raise
-        return found if found["max_xm"] < DIVERGED else None
 
-    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        return list(pool.map(one, cases))
+def _criteria_of(options: dict[str, Any]) -> dict[str, float] | None:
+    """Run once; None for a run that diverges."""
+    try:
+        found = values(run(**options, record=False))
+    except SimulationError as error:
+        if "not finite" in str(error):
+            return None
+        raise
+    return found if found["max_xm"] < DIVERGED else None
 
 
 def table_text(rows: list[dict[str, Any]]) -> str:
