@@ -176,7 +176,7 @@ def export(
         x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, aarch64-darwin; may be repeated
         [this machine]
     fmi_version
-        2.0
+        2.0, or 3.0, in which arrays are arrays
     """
     from fmus.export import export as export_fmu
 

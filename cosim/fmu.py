@@ -1,9 +1,10 @@
-"""An FMU as a participant: any FMI 2.0 FMU, Co-Simulation or Model Exchange, loaded by FMPy.
+"""An FMU as a participant: FMI 2.0 or 3.0, Co-Simulation or Model Exchange, loaded by FMPy.
 
     plant = FMU("plant.fmu", start={"m": 2.0})
 
-Scalar variables that are elements of one array (`accel[1]`, `accel[2]`, ...) appear as
-one port with a shape. Real, Integer and Boolean variables are ports.
+Arrays are ports with a shape (fmu_ports.py). Variables of all numeric types are ports, floats
+to the system; strings and binary data are start values only. What depends on the version of
+FMI is in fmi2.py and fmi3.py.
 """
 
 from __future__ import annotations
@@ -13,8 +14,7 @@ import re
 import shutil
 import weakref
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -22,20 +22,14 @@ from typing import Any
 import numpy as np
 
 from .errors import FMUError, did_you_mean
-from .participant import Participant
+from .fmi import Adapter
+from .fmi2 import Fmi2
+from .fmi3 import Fmi3
+from .fmu_ports import FMUPort, Shape, ports
+from .opcodes import Number
+from .participant import Participant, rate
 
-_NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
-
-
-@dataclass(frozen=True)
-class FMUPort:
-    """A port of an FMU: the variables that are its elements, in order."""
-
-    name: str
-    shape: tuple[int, ...]
-    unit: str | None
-    type: str
-    variables: tuple[Any, ...]
+_ADAPTERS: dict[str, type[Adapter]] = {"2": Fmi2, "3": Fmi3}
 
 
 class FMU:
@@ -44,33 +38,49 @@ class FMU:
     path
         the .fmu file
     start
-        values of parameters, inputs or start values by variable name
+        values of parameters, inputs or start values by variable name; structural parameters
+        (FMI 3.0) change the shapes of the arrays that they size
     substeps
         steps of the solver (ode4) in one communication step, for an FMU that has Model
         Exchange only, under sampled coupling
+    as_block
+        acts as a Block does, at communication points in the order of the connections: set
+        inputs, doStep from t_k, get outputs at t_k; what a Block that was exported needs
+    every, sample_period
+        of a block: at every so many-th communication point only, as for a Block
     """
 
     def __init__(
-        self, path: str | PathLike[str], *, start: Mapping[str, Any] | None = None, substeps: int = 1
+        self,
+        path: str | PathLike[str],
+        *,
+        start: Mapping[str, Any] | None = None,
+        substeps: int = 1,
+        as_block: bool = False,
+        every: int | None = None,
+        sample_period: float | None = None,
     ) -> None:
-        import fmpy
-
         self.path = Path(path)
         #: the participant that was exported to this file, where that is known
         self.source: Participant | None = None
         self.start = dict(start or {})
         self.substeps = substeps
+        self.as_block = as_block
+        self.every, self.sample_period = rate(self.path.name, every, sample_period)
         self.description = read_description(self.path)
+        self.adapter = _ADAPTERS[self.description.fmiVersion.partition(".")[0]]
         self.has_cs = self.description.coSimulation is not None
         self.has_me = self.description.modelExchange is not None
-        self._check_platform(fmpy.platform)
+        self._check_interfaces()
+        self._check_platform(self.adapter.platform())
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
-        readable = [
-            v for v in self.variables.values() if v.causality in ("output", "local") and v.type in _NUMERIC
-        ]
-        writable = [v for v in self.variables.values() if v.causality == "input" and v.type in _NUMERIC]
-        self.output_ports = _group(readable)
-        self.input_ports = _group(writable)
+        numeric = [v for v in self.variables.values() if v.type in self.adapter.NUMBERS]
+        self.output_ports = self._ports(v for v in numeric if v.causality in ("output", "local"))
+        self.input_ports = self._ports(v for v in numeric if v.causality == "input" and v.alias is None)
+        #: other names of inputs (FMI 3.0)
+        self.aliases = {
+            v.name: v.alias.name for v in numeric if v.causality == "input" and v.alias is not None
+        }
         self.inputs = {n: (p.shape, p.unit) for n, p in self.input_ports.items()}
         self.outputs = {n: (p.shape, p.unit) for n, p in self.output_ports.items()}
         #: the outputs proper, without local variables: what is recorded unless it is said
@@ -78,7 +88,7 @@ class FMU:
             n for n, p in self.output_ports.items() if p.variables[0].causality == "output"
         ]
         for name in self.start:
-            if name not in self.variables and name not in _group(self.variables.values()):
+            if name not in self.variables and name not in self._ports(self.variables.values()):
                 raise FMUError(
                     f"{self.path.name} has no variable '{name}'" + did_you_mean(name, self.variables)
                 )
@@ -87,6 +97,21 @@ class FMU:
             raise FMUError(f"{self.path.name}: substeps={substeps!r} is no whole number, 1 or more")
         self.directory = _extracted(self.path)
         weakref.finalize(self, shutil.rmtree, str(self.directory), ignore_errors=True)
+
+    def _check_interfaces(self) -> None:
+        if not (self.has_cs or self.has_me):
+            raise FMUError(
+                f"{self.path} has neither Co-Simulation nor Model Exchange, and Scheduled Execution is "
+                "not supported; export it with one of them"
+            )
+        if self.as_block and not self.has_cs:
+            raise FMUError(
+                f"{self.path.name}: as_block=True needs Co-Simulation, and it has Model Exchange only"
+            )
+        if not self.as_block and (self.every, self.sample_period) != (None, None):
+            raise FMUError(
+                f"{self.path.name}: every and sample_period are those of a block; say as_block=True"
+            )
 
     def _check_platform(self, platform: str) -> None:
         with zipfile.ZipFile(self.path) as archive:
@@ -99,24 +124,36 @@ class FMU:
                 "export it again for this platform, or with its sources"
             )
 
-    def start_values(self) -> dict[str, Any]:
-        """Return the start values that were given, by scalar variable; refuse what does not fit."""
-        groups = _group(self.variables.values())
-        found: dict[str, Any] = {}
+    def shape_of(self, variable: Any) -> Shape:
+        """Return the shape of a variable."""
+        return self.adapter.shape(variable, self.start)
+
+    def _ports(self, variables: Iterable[Any]) -> dict[str, FMUPort]:
+        found = ports(variables, self.shape_of)
+        return {name: port for name, port in found.items() if port.size > 0}
+
+    def start_values(self) -> dict[str, list[Any]]:
+        """Return the start values that were given, by variable; refuse what does not fit."""
+        joined = self._ports(self.variables.values())
+        found: dict[str, list[Any]] = {}
         for name, value in self.start.items():
-            port = groups[name] if name in groups else FMUPort(name, (), None, "", (self.variables[name],))
+            port = joined[name] if name in joined else self._ports([self.variables[name]])[name]
             kind = port.variables[0].type
+            number = self.adapter.NUMBERS[kind][1] if kind in self.adapter.NUMBERS else None
             try:
-                values = [value] if kind == "String" else np.broadcast_to(value, port.shape).ravel().tolist()
-                fits = kind == "String" or all(float(v) == int(v) for v in values if kind != "Real")
-                fits = fits and (kind != "Boolean" or set(values) <= {0, 1})
-                fits = fits and (kind == "String" or all(math.isfinite(float(v)) for v in values))
+                plain = np.asarray(value, dtype=object if number is None else None)
+                values = np.broadcast_to(plain, port.shape).ravel().tolist()
+                fits = all(_fits(kind, number, v) for v in values)
             except (TypeError, ValueError, OverflowError):
                 fits = False
             if not fits:
+                holds = f" ({number.values})" if number is not None and not number.is_float else ""
                 shape = f" of shape {port.shape}" if port.shape else ""
-                raise FMUError(f"{self.path.name}: start value {name} = {value!r} is no {kind}{shape}")
-            found |= {v.name: one for v, one in zip(port.variables, values, strict=True)}
+                raise FMUError(f"{self.path.name}: start value {name} = {value!r} is no {kind}{shape}{holds}")
+            each = port.size // len(port.variables)
+            plain_values = [_plain(number, v) for v in values]
+            for i, v in enumerate(port.variables):
+                found[v.name] = plain_values[i * each : (i + 1) * each]
         return found
 
     def feedthrough(self) -> dict[str, set[str]]:
@@ -124,26 +161,28 @@ class FMU:
 
         From the model structure: dependencies that are left out mean all, an empty list none.
         """
-        port_of = {v.name: name for name, p in self.input_ports.items() for v in p.variables}
-        declared = {u.variable.name: u.dependencies for u in self.description.outputs}
+        port_of = {self.key(v): name for name, p in self.input_ports.items() for v in p.variables}
+        declared = {
+            self.key(u.variable): u.dependencies
+            for u in self.description.outputs
+            if u.variable.type in self.adapter.NUMBERS
+        }
         found: dict[str, set[str]] = {}
         for name, port in self.output_ports.items():
             needs: set[str] = set()
             for variable in port.variables:
-                listed = declared.get(variable.name)
+                listed = declared.get(self.key(variable))
                 if listed is None:
                     needs |= set(self.input_ports)
                 else:
-                    needs |= {port_of[v.name] for v in listed if v.name in port_of}
+                    numeric = (v for v in listed if v.type in self.adapter.NUMBERS)
+                    needs |= {port_of[self.key(v)] for v in numeric if self.key(v) in port_of}
             found[name] = needs
         return found
 
-    @staticmethod
-    def unit_of(variable: Any) -> str | None:
-        """Return the unit of one of FMPy's variables, its own or its declared type's."""
-        declared = variable.declaredType
-        unit = variable.unit or (declared.unit if declared is not None else None)
-        return str(unit) if unit else None
+    def key(self, variable: Any) -> tuple[str, int]:
+        """Return what aliases have in common: functions that get and set it, and value reference."""
+        return self.adapter.NUMBERS[variable.type][0], variable.valueReference
 
     def __repr__(self) -> str:
         kinds = " and ".join(
@@ -167,8 +206,10 @@ def read_description(path: Path) -> Any:
         text = archive.read("modelDescription.xml")
     found = re.search(rb'fmiVersion\s*=\s*"([^"]*)"', text)
     version = found[1].decode(errors="replace") if found else "none"
-    if version != "2.0":
-        raise FMUError(f"{path} has FMI version {version}; FMI 2.0 is supported: export it as FMI 2.0")
+    if version != "2.0" and not version.startswith("3."):
+        raise FMUError(
+            f"{path} has FMI version {version}; FMI 2.0 and 3.0 are supported: export it as one of them"
+        )
     try:
         return fmpy.read_model_description(str(path))
     except XMLSyntaxError as error:
@@ -191,27 +232,17 @@ def _extracted(path: Path) -> Path:
         raise FMUError(f"{path} cannot be extracted: {error}") from error
 
 
-def _group(variables: Any) -> dict[str, FMUPort]:
-    """Join scalar variables `x[1]`, `x[2]` (or `K[1,1]`, ...) to array ports; keep the others."""
-    groups: dict[str, dict[tuple[int, ...], Any]] = {}
-    ports: dict[str, FMUPort] = {}
-    for v in variables:
-        match = re.fullmatch(r"(.*[^\]])\[(\d+(?:,\s*\d+)*)\]", v.name)
-        if match:
-            index = tuple(int(i) for i in match[2].split(","))
-            groups.setdefault(match[1], {})[index] = v
-        else:
-            ports[v.name] = FMUPort(v.name, (), FMU.unit_of(v), v.type, (v,))
-    for base, members in groups.items():
-        shape = tuple(max(index[d] for index in members) for d in range(len(next(iter(members)))))
-        count = 1
-        for n in shape:
-            count *= n
-        kinds = {(v.type, FMU.unit_of(v)) for v in members.values()}
-        ordered = sorted(members)
-        if base in ports or len(members) != count or len(kinds) != 1 or ordered[0] != (1,) * len(shape):
-            ports |= {v.name: FMUPort(v.name, (), FMU.unit_of(v), v.type, (v,)) for v in members.values()}
-            continue
-        type_, unit = kinds.pop()
-        ports[base] = FMUPort(base, shape, unit, type_, tuple(members[i] for i in ordered))
-    return ports
+def _plain(number: Number | None, value: Any) -> Any:
+    """Return a value as FMPy takes it."""
+    if number is None:
+        return value
+    return float(value) if number.is_float else int(value)
+
+
+def _fits(kind: str, number: Number | None, value: Any) -> bool:
+    """Tell whether a type holds a value exactly."""
+    if number is None:
+        return isinstance(value, bytes if kind == "Binary" else str)
+    if number.is_float:
+        return math.isfinite(float(value))
+    return bool(value == int(value) and number.low <= value <= number.high)

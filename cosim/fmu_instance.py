@@ -3,54 +3,49 @@
 from __future__ import annotations
 
 import ctypes
-from contextlib import chdir
+import math
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from .errors import FMUError
-from .fmu import FMU, FMUPort
+from .errors import FMUError, SimulationError
+from .fmu import FMU
+from .fmu_ports import FMUPort
 from .instances import Failures, buffer
 from .opcodes import (
     CALL,
     COMBINE,
     COPY,
-    FMI2_COMPLETED,
-    FMI2_DO_STEP,
-    FMI2_TIME,
-    FMI2_VALUES,
-    FMI2_VECTOR,
+    FMI_TIME,
+    FMI_VECTOR,
+    FROM_FLOAT,
+    TERMINATED,
     TO_FLOAT,
-    TO_INT,
+    Number,
     Op,
 )
 from .tableaus import TABLEAUS
 
-_STATUS = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
-_ACCESS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+_EVENT_ITERATIONS = 1000  # at one instant; more is a chain of events without end
 
 
 class _Exchange:
-    """The variables of one FMI type: value references, and a buffer of floats over all ports."""
+    """The ports of one FMI type: value references, and a buffer of floats over all of them."""
 
-    def __init__(self, type_: str, ports: list[FMUPort]) -> None:
-        self.type = type_
-        self.ports = ports
-        self.variables = [v for p in ports for v in p.variables]
-        self.references = np.array([v.valueReference for v in self.variables], dtype=np.uint32)
-        self.values = buffer(len(self.variables))
-        self.integers = np.zeros(max(len(self.variables), 1), dtype=np.int32)
-
-    def address(self, port: str) -> int | None:
-        """Return where the floats of a port are, if it is of this type."""
-        offset = 0
-        for p in self.ports:
-            if p.name == port:
-                return int(self.values.ctypes.data) + 8 * offset
-            offset += len(p.variables)
-        return None
+    def __init__(self, access: str, number: Number, ports: list[FMUPort]) -> None:
+        self.access = access
+        self.number = number
+        self.references = np.array([v.valueReference for p in ports for v in p.variables], dtype=np.uint32)
+        self.elements = [e for p in ports for e in p.elements()]
+        self.values = buffer(len(self.elements))
+        #: what the FMU reads and writes; the floats themselves if it does so in Float64
+        self.raw = self.values if number.dtype == "float64" else np.zeros(len(self.elements), number.dtype)
+        self.addresses: dict[str, int] = {}
+        offset = int(self.values.ctypes.data)
+        for p in ports:
+            self.addresses[p.name] = offset
+            offset += 8 * p.size
 
 
 class FMUInstance:
@@ -59,101 +54,54 @@ class FMUInstance:
     is_compiled = True
 
     def __init__(self, name: str, fmu: FMU, model_exchange: bool, failures: Failures, used: set[str]) -> None:
-        from fmpy.fmi2 import FMU2Model, FMU2Slave
-
         self.name = name
         self.fmu = fmu
-        self.messages: list[str] = []
         self.model_exchange = model_exchange
-        interface = fmu.description.modelExchange if model_exchange else fmu.description.coSimulation
-        make = FMU2Model if model_exchange else FMU2Slave
-        try:
-            with chdir(
-                fmu.directory
-            ):  # FMPy goes to the library's folder and stays there when it does not load
-                self.api: Any = make(
-                    guid=fmu.description.guid,
-                    unzipDirectory=str(fmu.directory),
-                    modelIdentifier=interface.modelIdentifier,
-                    instanceName=name,
-                )
-        except Exception as error:  # FMPy raises bare Exception when a library does not load
-            raise FMUError(f"{name}: the binary of {fmu.path} cannot be loaded: {error}") from error
         self.running = False
         #: what the call that ended the run returned; 3 is an error, 4 a fatal one
         self.status = 0
-        #: the start values that were given, by scalar variable
-        self.start_values = fmu.start_values()
-        self._instantiate()
-        self.inputs = [_Exchange(t, _of(fmu.input_ports, t)) for t in ("Real", "Integer", "Boolean")]
-        readable = {n: p for n, p in fmu.output_ports.items() if n in used}
-        self.outputs = [_Exchange(t, _of(readable, t)) for t in ("Real", "Integer", "Boolean")]
-        self.n_states = int(fmu.description.numberOfContinuousStates) if model_exchange else 0
+        self.fmi = fmu.adapter(fmu, name, model_exchange)
+        self.api = self.fmi.api
+        given = fmu.start_values()
+        structural = {n for n in given if fmu.variables[n].causality == "structuralParameter"}
+        #: the start values that were given, by variable
+        self.start_values = {n: v for n, v in given.items() if n not in structural}
+        self.fmi.configure({n: given[n] for n in structural})
+        self.inputs = self._exchanges(fmu.input_ports)
+        self.outputs = self._exchanges({n: p for n, p in fmu.output_ports.items() if n in used})
+        self.has_outputs = bool(self.outputs)
+        self.n_states, self.n_indicators = self.fmi.counts() if model_exchange else (0, 0)
         self.states = buffer(self.n_states)
-        self.slopes = buffer(self.n_states)
         self.state_address = int(self.states.ctypes.data)
-        self.has_outputs = bool(readable)
-        self.flags = np.zeros(2, dtype=np.int32)
+        self.flags = np.zeros(2, dtype=self.fmi.FLAG)
         self.event_time = np.array([np.inf])
         self.stages = buffer(5 * self.n_states)
         self.failures = failures
         self.event_callback: Any = None
 
+    def _exchanges(self, ports: dict[str, FMUPort]) -> list[_Exchange]:
+        groups: dict[tuple[str, Number], list[FMUPort]] = {}
+        for port in ports.values():
+            groups.setdefault(self.fmi.NUMBERS[port.type], []).append(port)
+        return [_Exchange(*kind, members) for kind, members in groups.items()]
+
     # ------------------------------------------------------------- life of an instance
-
-    def _instantiate(self) -> None:
-        from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-        from fmpy.logging import addLoggerProxy
-
-        def log(_: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
-            if status > 0 and len(self.messages) < 1000:
-                self.messages.append(f"[{_STATUS.get(status, 'warning')}] {message.decode(errors='replace')}")
-
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = fmi2CallbackLoggerTYPE(log)
-        callbacks.allocateMemory = defaultCallbacks.allocateMemory
-        callbacks.freeMemory = defaultCallbacks.freeMemory
-        addLoggerProxy(ctypes.byref(callbacks))
-        self._try("instantiate", lambda: self.api.instantiate(callbacks=callbacks, loggingOn=True))
-
-    def _try(self, what: str, call: Any) -> Any:
-        try:
-            return call()
-        except Exception as error:  # FMPy raises FMICallException and bare Exception alike
-            log = "".join(f"\n  {line}" for line in self.messages[-8:])
-            raise FMUError(f"{self.name} ({self.fmu.path.name}) failed to {what}: {error}{log}") from error
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization, with the start values that were given."""
-        api = self.api
-        self._try("set up the experiment", lambda: api.setupExperiment(startTime=t0))
-        self._set_start()
-        self._try("enter initialization", api.enterInitializationMode)
-        self._try("exit initialization", api.exitInitializationMode)
+        self.fmi.initialize(t0, self._set_start)
         self.running = True
-        for exchange in self.inputs:
-            for i, v in enumerate(exchange.variables):
-                exchange.values[i] = float(self.start_values.get(v.name, _start(v)))
+        for x in self.inputs:
+            x.values[:] = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
         if self.model_exchange:
-            self._discrete_states()
-            api.enterContinuousTimeMode()
+            self._discrete_states(t0)
+            self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
             self._get_states()
             self._signs = self._indicator_signs()
 
     def _set_start(self) -> None:
-        api = self.api
-        setters = {
-            "Real": (api.setReal, float),
-            "Integer": (api.setInteger, int),
-            "Enumeration": (api.setInteger, int),
-            "Boolean": (api.setBoolean, bool),
-            "String": (api.setString, str),
-        }
-        for name, value in self.start_values.items():
-            variable = self.fmu.variables[name]
-            setter, kind = setters[variable.type]
-            call = partial(setter, [variable.valueReference], [kind(value)])
-            self._try(f"set {name} = {value}", call)
+        for name, values in self.start_values.items():
+            self.fmi.set(self.fmu.variables[name], values)
 
     def stop(self) -> None:
         """Terminate and free the instance; after a fatal error it must not be called any more."""
@@ -163,9 +111,14 @@ class FMUInstance:
             try:
                 self.api.terminate()
             except Exception as error:  # the run is over; an FMU that cannot terminate is reported, not fatal
-                self.messages.append(f"[warning] terminate failed: {error}")
+                self.fmi.messages.append(f"[warning] terminate failed: {error}")
         self.running = False
         self.api.freeInstance()
+
+    def failure(self, op: Op, status: int, t: float, h: float) -> str:
+        """Return what it means that an operation ended with a status, and remember it for the end."""
+        self.status = status if status < TERMINATED else 0
+        return self.fmi.failure(status, op.code == self.fmi.DO_STEP, t, h * op.every)
 
     # ---------------------------------------------------------------------- operations
 
@@ -179,55 +132,54 @@ class FMUInstance:
 
     def address(self, port: str) -> int:
         """Return the address of the floats of a port."""
-        for exchange in [*self.inputs, *self.outputs]:
-            found = exchange.address(port)
-            if found is not None:
-                return found
-        raise KeyError(port)
+        return next(x.addresses[port] for x in [*self.inputs, *self.outputs] if port in x.addresses)
 
     def read(self, fraction: float = 0.0, text: str = "outputs") -> list[Op]:
         """Get the outputs that are used."""
         ops = []
         for x in self.outputs:
-            n = len(x.variables)
-            if n == 0:
-                continue
-            function = self._function(f"fmi2Get{_ACCESS[x.type]}")
-            real = x.type == "Real"
-            target = x.values if real else x.integers
-            ops.append(self._values(function, x, target.ctypes.data, int(real), f"{self.name}: {text} (FMU)"))
-            if not real:
-                ops.append(Op("", TO_FLOAT, a=x.integers.ctypes.data, b=x.values.ctypes.data, n=n))
+            is_float64 = x.raw is x.values
+            ops.append(replace(self._values("Get", x, int(is_float64)), text=f"{self.name}: {text} (FMU)"))
+            if not is_float64:
+                ops.append(self._convert(TO_FLOAT, x, x.raw, x.values))
         return ops
 
-    def _values(self, function: int, x: _Exchange, values: int, check: int, text: str) -> Op:
-        references = int(x.references.ctypes.data)
-        n = len(x.variables)
+    def _values(self, what: str, x: _Exchange, check: int = 0) -> Op:
         return Op(
-            text, FMI2_VALUES, function, self._component, references, values, check, n, participant=self.name
+            "",
+            self.fmi.VALUES,
+            self._function(f"{self.fmi.PREFIX}{what}{x.access}"),
+            self._component,
+            int(x.references.ctypes.data),
+            int(x.raw.ctypes.data),
+            check,
+            n=len(x.references),
+            count=len(x.elements),
+            participant=self.name,
         )
+
+    def _convert(self, code: int, x: _Exchange, source: Any, target: Any) -> Op:
+        a, b, n = int(source.ctypes.data), int(target.ctypes.data), len(x.elements)
+        return Op("", code, a=a, b=b, n=n, number=x.number, participant=self.name)
 
     def latch(self) -> list[Op]:
         """Set the inputs."""
         ops = []
         for x in self.inputs:
-            n = len(x.variables)
-            if n == 0:
-                continue
-            source = x.values.ctypes.data
-            if x.type != "Real":
-                ops.append(Op("", TO_INT, a=source, b=x.integers.ctypes.data, n=n, participant=self.name))
-                source = x.integers.ctypes.data
-            ops.append(self._values(self._function(f"fmi2Set{_ACCESS[x.type]}"), x, source, 0, ""))
+            if x.raw is not x.values:
+                ops.append(self._convert(FROM_FLOAT, x, x.values, x.raw))
+            ops.append(self._values("Set", x))
         return ops
 
+    def step(self, fraction: float = 0.0) -> list[Op]:
+        """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
+        stepped = (replace(op, fraction=fraction) for op in self.advance())
+        return [*self.latch(), *stepped, *(replace(op, text="") for op in self.read())]
+
     def advance(self) -> list[Op]:
-        """Do the step: fmi2DoStep, or Runge-Kutta over the model's derivatives with its input held."""
+        """Do the step: doStep, or Runge-Kutta over the model's derivatives with its input held."""
         if not self.model_exchange:
-            step = self._function("fmi2DoStep")
-            return [
-                Op(f"{self.name}: step (FMU)", FMI2_DO_STEP, step, self._component, participant=self.name)
-            ]
+            return [self._do_step()]
         nodes, rows, weights = TABLEAUS["ode4"]
         part = 1.0 / self.fmu.substeps
         base = self.stages.ctypes.data
@@ -244,6 +196,12 @@ class FMUInstance:
             ops.append(self._combine(base, [part * w for w in weights]))
         return [*ops, *self.set_states(1.0), *self.complete()]
 
+    def _do_step(self) -> Op:
+        function = self._function(f"{self.fmi.PREFIX}DoStep")
+        op = Op(f"{self.name}: step (FMU)", self.fmi.DO_STEP, function, self._component)
+        flags, last = self.fmi.step_answers()
+        return replace(op, b=flags, c=last, participant=self.name)
+
     def _combine(self, base: int, weights: list[float]) -> Op:
         slopes = base + 8 * self.n_states
         return Op(
@@ -252,26 +210,29 @@ class FMUInstance:
 
     def _vector(self, name: str, address: int) -> Op:
         n = self.n_states
-        return Op("", FMI2_VECTOR, self._function(name), self._component, address, n=n, participant=self.name)
+        return Op("", FMI_VECTOR, self._function(name), self._component, address, n=n, participant=self.name)
 
     def set_states(self, fraction: float) -> list[Op]:
         """Set time and states."""
-        time = self._function("fmi2SetTime")
-        ops = [Op("", FMI2_TIME, time, self._component, fraction=fraction, participant=self.name)]
-        return [*ops, self._vector("fmi2SetContinuousStates", self.state_address)] if self.n_states else ops
+        time = self._function(f"{self.fmi.PREFIX}SetTime")
+        ops = [Op("", FMI_TIME, time, self._component, fraction=fraction, participant=self.name)]
+        states = f"{self.fmi.PREFIX}SetContinuousStates"
+        return [*ops, self._vector(states, self.state_address)] if self.n_states else ops
 
     def derivatives(self, target: int, fraction: float) -> list[Op]:
         """Get the derivatives into `target`."""
-        return [self._vector("fmi2GetDerivatives", target)] if self.n_states else []
+        return [self._vector(self.fmi.DERIVATIVES, target)] if self.n_states else []
 
     def complete(self) -> list[Op]:
         """Tell the model that a step is completed; handle its events."""
         # always told, even where the model says that it need not be: FMPy reads that flag inverted
-        function = self._function("fmi2CompletedIntegratorStep")
+        function = self._function(f"{self.fmi.PREFIX}CompletedIntegratorStep")
         flags, event_time = int(self.flags.ctypes.data), int(self.event_time.ctypes.data)
-        told = Op("", FMI2_COMPLETED, function, self._component, flags, self._events_address(), event_time)
+        told = Op(
+            "", self.fmi.COMPLETED, function, self._component, flags, self._events_address(), event_time
+        )
         ops = [replace(told, fraction=1.0, participant=self.name)]
-        if int(self.fmu.description.numberOfEventIndicators or 0):
+        if self.n_indicators:
             text = f"{self.name}: events (Python callback)"
             ops.append(Op(text, CALL, self._events_address(), fraction=1.0, participant=self.name))
         return ops
@@ -284,39 +245,45 @@ class FMUInstance:
     # -------------------------------------------------------------------------- events
 
     def _indicator_signs(self) -> Any:
-        n = int(self.fmu.description.numberOfEventIndicators or 0)
+        n = self.n_indicators
         z = buffer(n)
         if n:
-            self.api.getEventIndicators(z.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), n)
+            pointer = z.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+            self.fmi.attempt("get its event indicators", lambda: self.api.getEventIndicators(pointer, n))
         return z > 0
 
     def _handle_events(self, t: float, h: float) -> None:
+        if self.flags[1]:
+            raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s")
         signs = self._indicator_signs()
         state_event = bool((signs != self._signs).any())
         time_event = t + 1e-9 * h >= self.event_time[0]
         if state_event or time_event or self.flags[0]:
-            self.api.enterEventMode()
-            self._discrete_states()
-            self.api.enterContinuousTimeMode()
+            self.fmi.attempt("enter event mode", self.api.enterEventMode)
+            self._discrete_states(t)
+            self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
             self._get_states()
             signs = self._indicator_signs()
         self._signs = signs
-        if self.flags[1]:
-            raise FMUError(f"{self.name} asked to end the simulation at t = {t:g} s")
 
-    def _discrete_states(self) -> None:
-        while True:
-            again, end, _, _, timed, time = self.api.newDiscreteStates()
+    def _discrete_states(self, t: float) -> None:
+        for _ in range(_EVENT_ITERATIONS):
+            again, end, _, _, timed, time = self.fmi.attempt(
+                "update its discrete states", self.fmi.discrete_states
+            )
             if end:
-                raise FMUError(f"{self.name} asked to end the simulation during event iteration")
+                raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s, in an event")
             if not again:
-                break
-        self.event_time[0] = time if timed else np.inf
+                self.event_time[0] = time if timed else np.inf
+                return
+        raise FMUError(
+            f"{self.name}: the event at t = {t:g} s does not end in {_EVENT_ITERATIONS} iterations"
+        )
 
     def _get_states(self) -> None:
         if self.n_states:
             pointer = self.states.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-            self._try("get its states", lambda: self.api.getContinuousStates(pointer, self.n_states))
+            self.fmi.attempt("get its states", lambda: self.api.getContinuousStates(pointer, self.n_states))
 
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output, the inputs on which it depends directly."""
@@ -324,27 +291,19 @@ class FMUInstance:
 
     def locate(self, address: int) -> str:
         """Return the name of the variable at an address, for an error message."""
-        for exchange in [*self.inputs, *self.outputs]:
-            index = (address - exchange.values.ctypes.data) // 8
-            if 0 <= index < len(exchange.variables):
-                return str(exchange.variables[index].name)
+        for x in [*self.inputs, *self.outputs]:
+            index = (address - int(x.values.ctypes.data)) // 8
+            if 0 <= index < len(x.elements):
+                return x.elements[index]
         state = (address - self.state_address) // 8
-        if 0 <= state < self.n_states:
-            return str(self.fmu.description.derivatives[state].variable.derivative.name)
+        for unknown in self.fmu.description.derivatives if state >= 0 else []:
+            variable = unknown.variable.derivative
+            n = math.prod(self.fmu.shape_of(variable))
+            if state < n:
+                return str(variable.name) if n == 1 else f"{variable.name}[{state + 1}]"
+            state -= n
         return "?"
 
     def log(self) -> list[str]:
         """Return what the FMU logged at warning level and above."""
-        return self.messages
-
-
-def _of(ports: dict[str, FMUPort], type_: str) -> list[FMUPort]:
-    wanted = ("Integer", "Enumeration") if type_ == "Integer" else (type_,)
-    return [p for p in ports.values() if p.type in wanted]
-
-
-def _start(variable: Any) -> float:
-    text = variable.start
-    if text is None:
-        return 0.0
-    return {"true": 1.0, "false": 0.0}[text] if text in ("true", "false") else float(text)
+        return self.fmi.messages

@@ -6,7 +6,9 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from .fmu import FMU
+from lxml import etree
+
+from .fmu_ports import unit_of
 from .scenario import aligned
 
 
@@ -17,14 +19,15 @@ def inspection(path: Path) -> str:
     description = read_description(path)
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
+        root = etree.fromstring(archive.read("modelDescription.xml"))
     platforms = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") > 1})
     facts = [
         ("model", f"{description.modelName}, FMI {description.fmiVersion}"),
         ("made by", f"{description.generationTool or 'unknown'}, {description.generationDateAndTime or ''}"),
         ("about", (description.description or "").partition("\n")[0]),
         ("platforms", ", ".join(platforms) or "none (sources only)"),
-        ("Co-Simulation", _capabilities(description.coSimulation)),
-        ("Model Exchange", _capabilities(description.modelExchange)),
+        ("Co-Simulation", _capabilities(root, "CoSimulation")),
+        ("Model Exchange", _capabilities(root, "ModelExchange")),
         ("default experiment", _experiment(description.defaultExperiment)),
         ("states", f"{description.numberOfContinuousStates}"),
         ("event indicators", f"{description.numberOfEventIndicators}"),
@@ -33,19 +36,27 @@ def inspection(path: Path) -> str:
     return "\n".join([*lines, "", aligned([_row(v) for v in description.modelVariables])])
 
 
-def _capabilities(interface: Any) -> str:
-    if interface is None:
+def _capabilities(root: Any, interface: str) -> str:
+    element = root.find(interface)
+    if element is None:
         return "no"
     wanted = {
         "canHandleVariableCommunicationStepSize": "variable step",
+        "hasEventMode": "event mode",
+        "mightReturnEarlyFromDoStep": "early return",
         "canGetAndSetFMUstate": "state get and set",
         "canSerializeFMUstate": "state serialised",
         "providesDirectionalDerivative": "directional derivatives",
         "canBeInstantiatedOnlyOncePerProcess": "one instance per process",
         "needsExecutionTool": "needs its tool",
     }
-    has = [text for name, text in wanted.items() if str(getattr(interface, name, "")).lower() == "true"]
-    return "yes: " + (", ".join(has) or "nothing optional")
+    renamed = {
+        "canGetAndSetFMUState": "canGetAndSetFMUstate",
+        "canSerializeFMUState": "canSerializeFMUstate",
+        "providesDirectionalDerivatives": "providesDirectionalDerivative",
+    }  # in FMI 3.0
+    true = {renamed.get(name, name) for name, value in element.attrib.items() if value in ("true", "1")}
+    return "yes: " + (", ".join(text for name, text in wanted.items() if name in true) or "nothing optional")
 
 
 def _experiment(experiment: Any) -> str:
@@ -64,9 +75,9 @@ def _experiment(experiment: Any) -> str:
 def _row(variable: Any) -> dict[str, Any]:
     return {
         "variable": variable.name,
-        "type": variable.type,
+        "type": variable.type + (f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""),
         "causality": variable.causality or "local",
-        "unit": FMU.unit_of(variable) or "-",
+        "unit": unit_of(variable) or "-",
         "start": variable.start if variable.start is not None else "-",
         "meaning": variable.description or "",
     }

@@ -18,7 +18,7 @@ import numpy as np
 from .compiler import kernel_addresses
 from .errors import CompilationError, DeclarationError, SimulationError
 from .opcodes import CALL, COPY, Op
-from .participant import KERNEL_TIMES, Block, Continuous, LinearContinuous, Participant
+from .participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from .variables import Array
 
 _KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
@@ -206,11 +206,6 @@ class KernelInstance:
     def log(self) -> list[str]:
         """Kernels do not log."""
         return []
-
-
-def is_block(participant: Any) -> bool:
-    """Tell whether a participant acts at communication points."""
-    return isinstance(participant, Block)
 
 
 def buffer(n: int) -> Array:

@@ -18,10 +18,10 @@ returned, or -1 - i when value i is not finite.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 
-from . import opcodes
+from . import conversions, opcodes
+from .conversions import number
 from .opcodes import Op
 
 INLINE = 8  # up to so many floats an operation is written out, above it is a loop
@@ -130,56 +130,6 @@ body:
 end:
   ret void
 }
-
-define internal void @to_float(ptr %x, ptr %y, i64 %n) {
-entry:
-  br label %loop
-loop:
-  %i = phi i64 [ 0, %entry ], [ %next, %body ]
-  %go = icmp slt i64 %i, %n
-  br i1 %go, label %body, label %end
-body:
-  %p = getelementptr i32, ptr %x, i64 %i
-  %q = getelementptr double, ptr %y, i64 %i
-  %v = load i32, ptr %p
-  %r = sitofp i32 %v to double
-  store double %r, ptr %q
-  %next = add i64 %i, 1
-  br label %loop
-end:
-  ret void
-}
-
-; floats to int32; -1 - i if value i is none
-define internal i64 @to_int(ptr %x, ptr %y, i64 %n) {
-entry:
-  br label %loop
-loop:
-  %i = phi i64 [ 0, %entry ], [ %next, %fits ]
-  %go = icmp slt i64 %i, %n
-  br i1 %go, label %body, label %end
-body:
-  %p = getelementptr double, ptr %x, i64 %i
-  %q = getelementptr i32, ptr %y, i64 %i
-  %v = load double, ptr %p
-  %r = call double @llvm.rint.f64(double %v)
-  %whole = fcmp oeq double %r, %v
-  %above = fcmp oge double %v, -2147483648.0
-  %below = fcmp ole double %v, 2147483647.0
-  %range = and i1 %above, %below
-  %fit = and i1 %whole, %range
-  %next = add i64 %i, 1
-  br i1 %fit, label %fits, label %bad
-fits:
-  %integer = fptosi double %r to i32
-  store i32 %integer, ptr %q
-  br label %loop
-bad:
-  %status = xor i64 %i, -1
-  ret i64 %status
-end:
-  ret i64 0
-}
 """
 
 _HEAD = """
@@ -206,6 +156,7 @@ class _Writer:
         self.row = 0
         self.block = "begin"
         self.failures: list[tuple[str, int, str]] = []
+        self.library: dict[str, str] = {}
 
     def value(self, expression: str) -> str:
         """Write `%n = expression` and return %n."""
@@ -236,6 +187,15 @@ class _Writer:
         """Return t0 + (k + fraction) h."""
         k = "%kf" if fraction == 0.0 else self.value(f"fadd double %kf, {number(fraction)}")
         return self.value(f"fadd double %t0, {self.value(f'fmul double {k}, %h')}")
+
+    def step(self, op: Op) -> str:
+        """Return the step: a block that acts at every so many points has one of its own."""
+        return "%h" if op.every == 1 else self.value(f"fmul double %h, {number(float(op.every))}")
+
+    def convert(self, function: tuple[str, str], op: Op) -> None:
+        """Call a conversion from a to b, of which the name and the text are given."""
+        name, self.library[name] = function
+        self.check(self.value(f"call i64 @{name}(ptr {self.word(1)}, ptr {self.word(2)}, i64 {op.n})"))
 
     def check(self, status: str) -> None:
         """Go on if the i64 status is 0, report it otherwise."""
@@ -276,11 +236,6 @@ class _Writer:
         return self.value(f"call i32 {function}({typed})")
 
 
-def number(x: float) -> str:
-    """Return a float as LLVM reads it exactly."""
-    return f"0x{struct.unpack('<Q', struct.pack('<d', x))[0]:016X}"
-
-
 # ------------------------------------------------------------------------------ operations
 
 
@@ -299,9 +254,7 @@ def _copy(w: _Writer, op: Op) -> None:
 
 
 def _call(w: _Writer, op: Op) -> None:
-    # a block that acts at every so many points has a step of its own
-    step = "%h" if op.every == 1 else w.value(f"fmul double %h, {number(float(op.every))}")
-    status = w.call("ptr double double", w.word(1), w.time(op.fraction), step)
+    status = w.call("ptr double double", w.word(1), w.time(op.fraction), w.step(op))
     w.check(w.value(f"sext i32 {status} to i64"))
     w.check_finite(w.word(2), op.n)
 
@@ -366,11 +319,11 @@ def _combine(w: _Writer, op: Op) -> None:
 
 
 def _to_float(w: _Writer, op: Op) -> None:
-    w.lines.append(f"  call void @to_float(ptr {w.word(1)}, ptr {w.word(2)}, i64 {op.n})")
+    w.convert(conversions.to_float(op.number), op)
 
 
-def _to_int(w: _Writer, op: Op) -> None:
-    w.check(w.value(f"call i64 @to_int(ptr {w.word(1)}, ptr {w.word(2)}, i64 {op.n})"))
+def _from_float(w: _Writer, op: Op) -> None:
+    w.convert(conversions.from_float(op.number), op)
 
 
 def _gather(w: _Writer, op: Op) -> None:
@@ -381,33 +334,52 @@ def _gather(w: _Writer, op: Op) -> None:
         w.lines.append(f"  store double {w.value(f'load double, ptr {source}')}, ptr {target}")
 
 
-def _fmi2_values(w: _Writer, op: Op) -> None:
+def _fmi_values(w: _Writer, op: Op) -> None:
     values = w.word(3)
-    w.check_fmi(w.call("ptr ptr i64 ptr", w.word(1), w.word(2), str(op.n), values))
-    w.check_finite(values, op.n if op.d else 0)
+    if op.code == opcodes.FMI2_VALUES:
+        status = w.call("ptr ptr i64 ptr", w.word(1), w.word(2), str(op.n), values)
+    else:
+        status = w.call("ptr ptr i64 ptr i64", w.word(1), w.word(2), str(op.n), values, str(op.count))
+    w.check_fmi(status)
+    w.check_finite(values, op.count if op.d else 0)
 
 
 def _fmi2_do_step(w: _Writer, op: Op) -> None:
-    w.check_fmi(w.call("ptr double double i32", w.word(1), w.time(op.fraction), "%h", "1"))
+    w.check_fmi(w.call("ptr double double i32", w.word(1), w.time(op.fraction), w.step(op), "1"))
 
 
-def _fmi2_time(w: _Writer, op: Op) -> None:
+def _fmi3_do_step(w: _Writer, op: Op) -> None:
+    event, terminate, early = (w.value(f"getelementptr i8, ptr {w.word(2)}, i64 {i}") for i in range(3))
+    times = (w.time(op.fraction), w.step(op))
+    kinds = "ptr double double i32 ptr ptr ptr ptr"
+    w.check_fmi(w.call(kinds, w.word(1), *times, "1", event, terminate, early, w.word(3)))
+    status = "0"
+    for flag, code in ((early, opcodes.EARLY_RETURN), (terminate, opcodes.TERMINATED)):
+        is_set = w.value(f"icmp ne i8 {w.value(f'load i8, ptr {flag}')}, 0")
+        status = w.value(f"select i1 {is_set}, i64 {code}, i64 {status}")
+    w.check(status)
+
+
+def _fmi_time(w: _Writer, op: Op) -> None:
     w.check_fmi(w.call("ptr double", w.word(1), w.time(op.fraction)))
 
 
-def _fmi2_vector(w: _Writer, op: Op) -> None:
+def _fmi_vector(w: _Writer, op: Op) -> None:
     w.check_fmi(w.call("ptr ptr i64", w.word(1), w.word(2), str(op.n)))
 
 
-def _fmi2_completed(w: _Writer, op: Op) -> None:
+def _fmi_completed(w: _Writer, op: Op) -> None:
+    boolean = "i32" if op.code == opcodes.FMI2_COMPLETED else "i8"
     flags = w.word(2)
-    second = w.value(f"getelementptr i32, ptr {flags}, i64 1")
+    second = w.value(f"getelementptr {boolean}, ptr {flags}, i64 1")
     w.check_fmi(w.call("ptr i32 ptr ptr", w.word(1), "1", flags, second))
     t = w.time(op.fraction)
     almost = w.value(f"fadd double {t}, {w.value(f'fmul double %h, {number(1e-9)}')}")
     due = w.value(f"fcmp oge double {almost}, {w.value(f'load double, ptr {w.word(4)}')}")
-    either = w.value(f"or i32 {w.value(f'load i32, ptr {flags}')}, {w.value(f'load i32, ptr {second}')}")
-    asked = w.value(f"icmp ne i32 {either}, 0")
+    either = w.value(
+        f"or {boolean} {w.value(f'load {boolean}, ptr {flags}')}, {w.value(f'load {boolean}, ptr {second}')}"
+    )
+    asked = w.value(f"icmp ne {boolean} {either}, 0")
     handle, on = w.label(), w.label()
     w.lines.append(f"  br i1 {w.value(f'or i1 {due}, {asked}')}, label %{handle}, label %{on}")
     w.start_block(handle)
@@ -424,13 +396,16 @@ _WRITE: dict[int, Callable[[_Writer, Op], None]] = {
     opcodes.STATISTICS: _statistics,
     opcodes.COMBINE: _combine,
     opcodes.TO_FLOAT: _to_float,
-    opcodes.TO_INT: _to_int,
+    opcodes.FROM_FLOAT: _from_float,
     opcodes.GATHER: _gather,
-    opcodes.FMI2_VALUES: _fmi2_values,
+    opcodes.FMI2_VALUES: _fmi_values,
+    opcodes.FMI3_VALUES: _fmi_values,
     opcodes.FMI2_DO_STEP: _fmi2_do_step,
-    opcodes.FMI2_TIME: _fmi2_time,
-    opcodes.FMI2_VECTOR: _fmi2_vector,
-    opcodes.FMI2_COMPLETED: _fmi2_completed,
+    opcodes.FMI3_DO_STEP: _fmi3_do_step,
+    opcodes.FMI_TIME: _fmi_time,
+    opcodes.FMI_VECTOR: _fmi_vector,
+    opcodes.FMI2_COMPLETED: _fmi_completed,
+    opcodes.FMI3_COMPLETED: _fmi_completed,
 }
 
 
@@ -455,7 +430,7 @@ def loop_ir(first: list[Op], second: list[Op]) -> str:
                 f"  store i64 {name}, ptr {w.value(f'getelementptr i64, ptr %report, i64 {place}')}"
             )
         w.lines.append("  ret i32 1")
-    return "\n".join([_LIBRARY, _HEAD, *w.lines, "}"]) + "\n"
+    return "\n".join([_LIBRARY, *w.library.values(), _HEAD, *w.lines, "}"]) + "\n"
 
 
 def _operation(w: _Writer, op: Op) -> None:

@@ -25,7 +25,7 @@ from .errors import RecordError, SimulationError, TimeError, WiringError, did_yo
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures
-from .opcodes import CALL, COMBINE, FMI2_VALUES, TO_INT
+from .opcodes import CALL, COMBINE, FMI2_VALUES, FMI3_VALUES, FROM_FLOAT, TO_FLOAT
 from .program import Program, steps_between
 from .result import Result, Statistics
 from .system import Port, System, outputs_of
@@ -289,28 +289,32 @@ class _Run:
         if failures.exception is not None:
             where, t = failures.participant, failures.time
             what = f"{type(failures.exception).__name__}: {failures.exception}"
-            error = SimulationError(f"{where} failed at t = {t:g} s: {what}")
+            asked = isinstance(failures.exception, SimulationError)  # an FMU's: place and time are in it
+            text = str(failures.exception) if asked else f"{where} failed at t = {t:g} s: {what}"
+            error = SimulationError(text)
             error.__cause__ = failures.exception
             error.result = self._result(interrupted=True)
             return error
         op = program.rows[row]
         t = op.seconds(self.start, k, program.h)
         instance = program.instances[op.participant]
-        checked = {CALL: op.b, COMBINE: op.c, FMI2_VALUES: op.c, TO_INT: op.a}
+        values = {FMI2_VALUES: op.c, FMI3_VALUES: op.c, FROM_FLOAT: op.a, TO_FLOAT: op.b}
+        checked = {CALL: op.b, COMBINE: op.c, **values}
         if status < 0 and op.code in checked:
             variable = instance.locate(checked[op.code] + 8 * (-status - 1))
-            what = "is not a whole number" if op.code == TO_INT else "is not finite (NaN or infinite)"
+            what = "is not finite (NaN or infinite)"
+            if op.code == FROM_FLOAT:
+                what = f"is not {op.number.values}"
+            elif op.code == TO_FLOAT and not op.number.is_float:
+                what = "is above 2^53, which a float does not hold"
             text = (
                 f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); "
                 "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
             )
+        elif isinstance(instance, FMUInstance):
+            text = instance.failure(op, status, t, program.h) + f" (step {k})"
         else:
-            names = {2: "fmi2Discard", 3: "fmi2Error", 4: "fmi2Fatal"}
-            why = f"{names.get(status, f'status {status}')}; look at its inputs and at its log"
-            if isinstance(instance, FMUInstance):
-                instance.status = status
-            else:
-                why = "an exception in its kernel; run with jit=False to see where"
+            why = "an exception in its kernel; run with jit=False to see where"
             text = f"{op.participant} failed at t = {t:g} s (step {k}) with {why}"
         log = instance.log()[-8:]
         if log:

@@ -10,14 +10,54 @@ CALL = 1  # kernel `function` on record a at the row's time; then n floats at b 
 RECORD = 2  # append the floats whose n addresses are at a to buffer b
 STATISTICS = 3  # update (min, max, sum, sum of squares) at b for the n addresses at a
 COMBINE = 4  # c = a + h sum_i w_i b_i, vectors of n floats, b one row a stage; c must be finite
-TO_FLOAT = 5  # n int32 at a -> floats at b
-TO_INT = 6  # n floats at a -> int32 at b; a fraction is an error
+TO_FLOAT = 5  # n values of type `number` at a -> floats at b; one that a float does not hold is an error
+FROM_FLOAT = 6  # n floats at a -> values of type `number` at b; one that the type does not hold is an error
 GATHER = 7  # n floats, from the first to the second address of n pairs at a
-FMI2_VALUES = 10  # get or set n values at c by value references b; with d > 0 they must be finite
-FMI2_DO_STEP = 11
-FMI2_TIME = 12
-FMI2_VECTOR = 13  # get or set the vector b of n floats (states, derivatives)
-FMI2_COMPLETED = 14  # b: int32 flags "enter event mode", "terminate"; one set, or time d due, calls c
+FMI2_VALUES = 10  # get or set `count` values at c by n references b; with d > 0 they must be finite
+FMI3_VALUES = 11
+FMI2_DO_STEP = 12
+FMI3_DO_STEP = 13  # b: three bools "event, terminate, early return"; c: last successful time
+FMI_TIME = 14
+FMI_VECTOR = 15  # get or set the vector b of n floats (states, derivatives)
+FMI2_COMPLETED = 16  # b: flags "enter event mode", "terminate"; one set, or time d due, calls c
+FMI3_COMPLETED = 17
+
+#: statuses that the loop adds to those of FMI: fmi3DoStep asked to end, or stopped before t + h
+TERMINATED = 100
+EARLY_RETURN = 101
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number type of FMI in memory: LLVM's and NumPy's name, and the whole numbers that it holds."""
+
+    llvm: str
+    dtype: str
+    low: int = 0
+    high: int = 0
+
+    @property
+    def is_float(self) -> bool:
+        """Tell whether it holds fractions."""
+        return self.high == 0
+
+    @property
+    def values(self) -> str:
+        """Return what it holds, for an error message."""
+        return f"a whole number from {self.low} to {self.high}" if self.high else "in the range of Float32"
+
+
+def _integer(bits: int, signed: bool = True) -> Number:
+    low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+    return Number(f"i{bits}", f"{'' if signed else 'u'}int{bits}", low, high)
+
+
+NUMBERS = {
+    "Float64": Number("double", "float64"),
+    "Float32": Number("float", "float32"),
+    **{f"Int{bits}": _integer(bits) for bits in (8, 16, 32, 64)},
+    **{f"UInt{bits}": _integer(bits, signed=False) for bits in (8, 16, 32, 64)},
+}
 
 
 @dataclass(frozen=True)
@@ -32,6 +72,8 @@ class Op:
     c: int = 0
     d: int = 0
     n: int = 0
+    count: int = 0
+    number: Number = NUMBERS["Float64"]
     every: int = 1
     weights: tuple[float, ...] = ()
     fraction: float = 0.0

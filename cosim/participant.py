@@ -42,6 +42,20 @@ def whole_number(what: str, value: Any) -> int:
     return int(number)
 
 
+def rate(where: str, every: Any, sample_period: Any) -> tuple[int | None, float | None]:
+    """Return `every` and `sample_period` of a block, of which one at most is given."""
+    if every is not None and sample_period is not None:
+        raise DeclarationError(f"{where}: give every or sample_period, not both")
+    if sample_period is not None and not (
+        isinstance(sample_period, Real) and math.isfinite(sample_period) and float(sample_period) > 0.0
+    ):
+        raise DeclarationError(f"{where}: sample_period={sample_period!r} s is not above zero")
+    return (
+        None if every is None else whole_number(f"{where}: every", every),
+        None if sample_period is None else float(sample_period),
+    )
+
+
 class Participant:
     """What blocks and continuous systems share: declared variables in one record."""
 
@@ -272,16 +286,9 @@ class Block(Participant):
         self, *, every: int | None = None, sample_period: float | None = None, **values: Any
     ) -> None:
         where = type(self).__name__
-        if every is not None and sample_period is not None:
-            raise DeclarationError(f"{where}: give every or sample_period, not both")
         if type(self).step is Block.step:
             raise DeclarationError(f"{where} has no step(self, t, h); a Block needs one")
-        if sample_period is not None and not (
-            isinstance(sample_period, Real) and math.isfinite(sample_period) and sample_period > 0
-        ):
-            raise DeclarationError(f"{where}: sample_period={sample_period!r} s is not above zero")
-        self.every = None if every is None else whole_number(f"{where}: every", every)
-        self.sample_period = None if sample_period is None else float(sample_period)
+        self.every, self.sample_period = rate(where, every, sample_period)
         super().__init__(**values)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:

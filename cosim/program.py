@@ -27,7 +27,7 @@ from .instances import Failures, KernelInstance, buffer
 from .loop import loop_ir
 from .opcodes import COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
 from .participant import Block
-from .system import Connection, Port, System, cycle_text
+from .system import Connection, Port, System, cycle_text, is_block
 from .tableaus import TABLEAUS
 from .variables import Array
 
@@ -76,6 +76,7 @@ class Program:
         self.h = h
         self.failures = Failures()
         self.instances: dict[str, Instance] = {}
+        self._alone: dict[str, str] = {}  # FMUs that can be there once only, by token
         self.buffers: list[Array] = []
         self.first: list[Op] = []
         self.second: list[Op] = []
@@ -106,17 +107,37 @@ class Program:
     def _instance(self, name: str, member: object, stage: bool, jit: bool, used: set[str]) -> Instance:
         if not isinstance(member, FMU):
             return KernelInstance(name, member, jit, self.failures)  # type: ignore[arg-type]
-        if stage and not member.has_me:
+        if stage and member.as_block and (member.every, member.sample_period) == (None, None):
+            raise WiringError(
+                f"{name} ({member.path.name}) stands for a block at every stage of the solver, and an FMU "
+                "steps at communication points only; give it sample_period= or every=1, "
+                'or use coupling="sampled"'
+            )
+        if stage and not member.as_block and not member.has_me:
             raise WiringError(
                 f"{name} ({member.path.name}) has no Model Exchange, which stage coupling needs; "
                 'use coupling="sampled" or export it with Model Exchange'
             )
-        return FMUInstance(name, member, stage or not member.has_cs, self.failures, used)
+        model_exchange = (stage and not member.as_block) or not member.has_cs
+        self._check_alone(name, member, model_exchange)
+        return FMUInstance(name, member, model_exchange, self.failures, used)
+
+    def _check_alone(self, name: str, fmu: FMU, model_exchange: bool) -> None:
+        description = fmu.description
+        interface = description.modelExchange if model_exchange else description.coSimulation
+        other = self._alone.get(description.guid)
+        if other is not None:
+            raise WiringError(
+                f"{name} and {other} are the same FMU, {fmu.path.name}, which can be instantiated only once "
+                "per process; run one of them alone, or use an FMU without this limit"
+            )
+        if interface.canBeInstantiatedOnlyOncePerProcess:
+            self._alone[description.guid] = name
 
     def _rate(self, name: str) -> int | None:
         """Return every how many steps a block acts; None when it follows the coupling."""
         block = self.system.participants[name]
-        assert isinstance(block, Block)
+        assert isinstance(block, (Block, FMU))
         if block.sample_period is not None:
             return steps_between(block.sample_period, self.h, f"{name}: sample period")
         return block.every
@@ -127,7 +148,7 @@ class Program:
             instance.stop()
 
     def _is_block(self, name: str) -> bool:
-        return isinstance(self.system.participants[name], Block)
+        return is_block(self.system.participants[name])
 
     # --------------------------------------------------------------------- connections
 
@@ -182,12 +203,8 @@ class Program:
         ]
 
     def _block(self, name: str, delays: dict[int, Array], fraction: float = 0.0, every: int = 1) -> list[Op]:
-        instance = self.instances[name]
-        assert isinstance(instance, KernelInstance)
-        return [
-            *self._copies(name, delays, every),
-            *(replace(op, every=every) for op in instance.step(fraction)),
-        ]
+        acting = self.instances[name].step(fraction)
+        return [*self._copies(name, delays, every), *(replace(op, every=every) for op in acting)]
 
     # ----------------------------------------------------------------- recorded signals
 

@@ -79,6 +79,11 @@ def outputs_of(member: Member) -> dict[str, tuple[tuple[int, ...], str | None]]:
     return member.outputs
 
 
+def is_block(member: Member) -> bool:
+    """Tell whether a participant acts at communication points: a Block, or an FMU in its place."""
+    return member.as_block if isinstance(member, FMU) else isinstance(member, Block)
+
+
 class System:
     """Participants by name and the connections between them."""
 
@@ -154,6 +159,8 @@ class System:
             )
         member = self.participants[where]
         ports = inputs_of(member) if direction == "input" else outputs_of(member)
+        if direction == "input" and isinstance(member, FMU):
+            name = member.aliases.get(name, name)
         if name in ports:
             shape, unit = ports[name]
             count = 1
@@ -172,7 +179,7 @@ class System:
 
     def block_order(self) -> list[str]:
         """Return the blocks in the order of their connections; a cycle of blocks is an error."""
-        blocks = [n for n, m in self.participants.items() if isinstance(m, Block)]
+        blocks = [n for n, m in self.participants.items() if is_block(m)]
         graph: dict[str, list[str]] = {name: [] for name in blocks}
         for c in self.connections:
             a, b = c.source.participant, c.target.participant

@@ -1,0 +1,141 @@
+"""What the versions of FMI have in common: the base of their adapters, fmi2.py and fmi3.py.
+
+An adapter is one instance of an FMU behind FMPy's object for its version. It knows what
+the versions name or order differently: types, loading, the way into initialization,
+counts, and which operation of the loop calls a function.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import chdir
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from .errors import FMUError
+from .fmu_ports import Shape
+from .opcodes import EARLY_RETURN, TERMINATED, Number
+
+if TYPE_CHECKING:
+    from .fmu import FMU
+
+_LABELS = {1: "warning", 2: "discard", 3: "error", 4: "fatal", 5: "pending"}
+
+
+class Adapter(ABC):
+    """An instance of an FMU of one FMI version."""
+
+    PREFIX: ClassVar[str]
+    #: of every numeric type the part of the function name (fmi2GetReal, fmi3GetFloat64), and its memory
+    NUMBERS: ClassVar[dict[str, tuple[str, Number]]]
+    DERIVATIVES: ClassVar[str]
+    #: operations of the loop, and the type of the flags that functions return
+    VALUES: ClassVar[int]
+    DO_STEP: ClassVar[int]
+    COMPLETED: ClassVar[int]
+    FLAG: ClassVar[str]
+
+    def __init__(self, fmu: FMU, name: str, model_exchange: bool) -> None:
+        self.fmu = fmu
+        self.name = name
+        self.messages: list[str] = []
+        self.model_exchange = model_exchange
+        description = fmu.description
+        interface = description.modelExchange if model_exchange else description.coSimulation
+        try:
+            # FMPy goes to the library's folder and stays there when it does not load
+            with chdir(fmu.directory):
+                self.api: Any = self._class(model_exchange)(
+                    guid=description.guid,
+                    unzipDirectory=str(fmu.directory),
+                    modelIdentifier=interface.modelIdentifier,
+                    instanceName=name,
+                )
+        except Exception as error:  # FMPy raises bare Exception when a library does not load
+            raise FMUError(f"{name}: the binary of {fmu.path} cannot be loaded: {error}") from error
+        self.attempt("instantiate", self._instantiate)
+
+    @staticmethod
+    @abstractmethod
+    def platform() -> str:
+        """Return the folder of this machine's binary."""
+
+    @staticmethod
+    @abstractmethod
+    def shape(variable: Any, start: Mapping[str, Any]) -> Shape:
+        """Return the shape of a variable, with the start values that were given."""
+
+    @abstractmethod
+    def _class(self, model_exchange: bool) -> Any: ...
+
+    @abstractmethod
+    def _instantiate(self) -> None: ...
+
+    @abstractmethod
+    def configure(self, values: Mapping[str, Sequence[Any]]) -> None:
+        """Set structural parameters; right after the instance is made."""
+
+    @abstractmethod
+    def initialize(self, t0: float, set_start: Callable[[], None]) -> None:
+        """Go through initialization; start values are set where they have to be."""
+
+    @abstractmethod
+    def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:
+        """Update the discrete states: again, end, nominals changed, states changed, timed, time."""
+
+    @abstractmethod
+    def counts(self) -> tuple[int, int]:
+        """Return the number of continuous states and of event indicators."""
+
+    @abstractmethod
+    def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
+        """Get values."""
+
+    @abstractmethod
+    def end_of_step(self, status: int) -> tuple[int, float | None]:
+        """Return what a failed step was (TERMINATED, EARLY_RETURN, or its status), and how far it came."""
+
+    def step_answers(self) -> tuple[int, int]:
+        """Return the addresses of the flags and of the time that doStep answers with, if it does."""
+        return 0, 0
+
+    def set(self, variable: Any, values: Sequence[Any]) -> None:
+        """Set the values of a variable."""
+        access = self.NUMBERS[variable.type][0] if variable.type in self.NUMBERS else variable.type
+        setter = getattr(self.api, f"set{access}")
+        shown = values[0] if len(values) == 1 else list(values)
+        self.attempt(
+            f"set {variable.name} = {shown}", lambda: setter([variable.valueReference], list(values))
+        )
+
+    def attempt(self, what: str, call: Callable[[], Any]) -> Any:
+        """Call a function of FMPy; what it raises becomes an error with the FMU's log."""
+        try:
+            return call()
+        except Exception as error:  # FMPy raises FMICallException and bare Exception alike
+            log = "".join(f"\n  {line}" for line in self.messages[-8:])
+            raise FMUError(f"{self.name} ({self.fmu.path.name}) failed to {what}: {error}{log}") from error
+
+    def note(self, status: int, message: bytes | None) -> None:
+        """Keep a line of the FMU's log, at warning level and above."""
+        if status > 0 and len(self.messages) < 1000:
+            text = (message or b"").decode(errors="replace")
+            self.messages.append(f"[{_LABELS.get(status, 'warning')}] {text}")
+
+    def failure(self, status: int, is_step: bool, t: float, h: float) -> str:
+        """Return what a status of the loop means; `t` is when the call was made, `h` the step."""
+        where = f"at t = {t:g} s"
+        last = None
+        if is_step:
+            status, last = self.end_of_step(status)
+        reached = "" if last is None else f" (it came to t = {last:g} s)"
+        if status == TERMINATED:
+            return f"{self.name} asked to end the simulation in the step from t = {t:g} s{reached}"
+        if status == EARLY_RETURN:
+            return (
+                f"{self.name} returned early from its step of {h:g} s from t = {t:g} s{reached}, which was "
+                "not allowed to it; a step that it takes as a whole is needed: try another step="
+            )
+        label = _LABELS.get(status)
+        named = f"{self.PREFIX}{label.capitalize()}" if label else f"status {status}"
+        return f"{self.name} failed {where} with {named}; look at its inputs and at its log"
