@@ -8,9 +8,7 @@ ratio compares like with like. With the benchmark's data (BENCHMARK_DATA) the br
 
 from __future__ import annotations
 
-import os
 import time
-from pathlib import Path
 
 import numpy as np
 import scipy.linalg as la
@@ -20,8 +18,8 @@ from cosim.earthquakes import earthquake
 from fmus.export import export
 from fmus.highway_bridge import BEARING
 from scenarios import _bridge_control as control
+from tests.benchmark_data import BRIDGE
 
-DATA = Path(os.environ["BENCHMARK_DATA"]) / "highway_bridge" if "BENCHMARK_DATA" in os.environ else None
 H = control.STEP
 
 
@@ -58,11 +56,11 @@ def dense_newmark(structure, ground, steps):
 def test_against_full_factorisation(capsys):
     """Same displacements to 1e-6 (events are not bisected here); speed is only reported, and must not
     be lost: at least 20 times."""
-    bridge = control.plant(DATA)
+    bridge = control.plant(BRIDGE)
     bridge.event_tolerance = 1e9
-    quake = earthquake("el-centro", DATA / "records" if DATA else None)
+    quake = earthquake("el-centro", BRIDGE / "records" if BRIDGE else None)
     system = control.bridge_system(bridge, quake, "none", 1, step=H)
-    first = 120 if DATA else 400
+    first = 120 if BRIDGE else 400
     result = simulate(system, step=H, stop=20.0, record=["bridge.y"])
     began = time.perf_counter()
     reference = dense_newmark(bridge.linear_model(), quake.step_means(H, 20.0), first)
@@ -76,8 +74,8 @@ def test_against_full_factorisation(capsys):
 
 def test_fmu_with_network_is_faster_than_real_time(tmp_path, capsys):
     """100 s at 5 ms; the goal is 20 times real time on one core, and the FMU gives our own numbers."""
-    bridge = control.plant(DATA)
-    quake = earthquake("el-centro", DATA / "records" if DATA else None)
+    bridge = control.plant(BRIDGE)
+    quake = earthquake("el-centro", BRIDGE / "records" if BRIDGE else None)
     system = control.bridge_system(bridge, quake, "scwnn", 1)
     own = simulate(system, step=H, stop=100.0, record=["bridge.y"])
     path = export(bridge, tmp_path / "bridge.fmu", interfaces=["CoSimulation"])

@@ -8,9 +8,7 @@ without it, it is said and nothing else is.
 from __future__ import annotations
 
 import json
-import os
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,11 +19,9 @@ from cosim.blocks.sources import RecordSource
 from cosim.earthquakes import earthquake
 from fmus.benchmark_bridge import benchmark_bridge
 from fmus.highway_bridge import EI, M_Y, highway_bridge
+from tests.benchmark_data import BRIDGE, needs_data
 
-DATA = os.environ.get("BENCHMARK_DATA")
-FOLDER = Path(DATA or "") / "highway_bridge"
 FILES = {"el-centro": "Elcentro", "chi-chi": "Chichi084", "northridge": "Rinadi"}
-needs_data = pytest.mark.skipif(not DATA, reason="BENCHMARK_DATA names no folder with the benchmark's files")
 
 
 def dense(bridge, name):
@@ -45,7 +41,7 @@ def uncontrolled(model, name, step, stop=None, folder=None):
     bridge = (
         highway_bridge()
         if model == "reduced"
-        else benchmark_bridge(FOLDER, late_events=model == "late", bisections=0 if model == "late" else 5)
+        else benchmark_bridge(BRIDGE, late_events=model == "late", bisections=0 if model == "late" else 5)
     )
     quake = earthquake(name, folder)
     stop = quake.duration if stop is None else stop
@@ -99,7 +95,7 @@ def test_reduced_bridge_under_el_centro():
 @pytest.mark.parametrize("name", ["n-palm-springs", "chi-chi", "el-centro", "northridge", "turkey", "kobe"])
 def test_reduced_bridge_against_the_full_model(name):
     """Midspan and bearing peaks within 15 %, the same number of yielded column ends."""
-    records = FOLDER / "records"
+    records = BRIDGE / "records"
     reduced = uncontrolled("reduced", name, 0.005, folder=records)
     full = uncontrolled("full", name, 0.005, folder=records)
     for port, columns in (("y", slice(None)), ("deformation", slice(16))):
@@ -109,7 +105,7 @@ def test_reduced_bridge_against_the_full_model(name):
 
 
 def full_model(name, late):
-    return uncontrolled("late" if late else "full", name, 0.002, folder=FOLDER / "records")
+    return uncontrolled("late" if late else "full", name, 0.002, folder=BRIDGE / "records")
 
 
 @needs_data
@@ -120,7 +116,7 @@ def test_full_model_reproduces_the_benchmark(name):
     """With events a step late, as in the benchmark's code, histories agree to 1e-4 relative RMS (the
     files have six digits) and all peaks to 1e-4, with 0, 4 and 6 yielded column ends."""
     result = full_model(name, late=True)
-    stored = np.load(FOLDER / "uncontrolled" / f"{FILES[name]}.npz")
+    stored = np.load(BRIDGE / "uncontrolled" / f"{FILES[name]}.npz")
     ours = {
         "mid_x": result["bridge.y"][:, 0], "mid_y": result["bridge.y"][:, 1],
         "acc_x": result["bridge.a"][:, 0], "acc_y": result["bridge.a"][:, 1],
@@ -130,7 +126,7 @@ def test_full_model_reproduces_the_benchmark(name):
     for key, values in ours.items():
         error = values[: 2 * n : 2] - stored[key][:n]
         assert np.sqrt((error**2).mean() / (stored[key][:n] ** 2).mean()) < 1e-4, key
-    peaks = json.loads((FOLDER / "uncontrolled" / "peaks.json").read_text())[FILES[name]]
+    peaks = json.loads((BRIDGE / "uncontrolled" / "peaks.json").read_text())[FILES[name]]
     moments = result["bridge.force"][:, 16:]
     shear = (
         np.abs(moments[:, 16::20] + moments[:, 17::20]).max(),

@@ -17,12 +17,9 @@ from fmus.tall_building import (
     modes_of,
     with_damper,
 )
+from tests.benchmark_data import TOWER, needs_data
 
-DATA = Path(__file__).parents[2] / "../shared/data/tall_building/mck.npz"
 BENCHMARK_FREQUENCIES = (0.15997, 0.76510, 1.99206, 3.78986, 6.39446)
-needs_data = pytest.mark.skipif(
-    not DATA.exists(), reason="the benchmark's matrices are not part of the project"
-)
 
 
 def test_cantilever_bends_as_in_the_book() -> None:
@@ -46,7 +43,7 @@ def test_first_five_frequencies_and_damping() -> None:
 @needs_data
 def test_default_building_is_the_benchmark_where_it_matters() -> None:
     """MAC above 0.999 in three modes, modal masses within 1 %: the load's effect scales with them."""
-    own, target = modes_of(default_building()), modes_of(load_building(str(DATA)))
+    own, target = modes_of(default_building()), modes_of(load_building(str(TOWER)))
     np.testing.assert_allclose(own.frequency[:5], target.frequency[:5], rtol=5e-3)
     for i in range(3):
         a, b = own.shapes[:, i], target.shapes[:, i]
@@ -57,7 +54,7 @@ def test_default_building_is_the_benchmark_where_it_matters() -> None:
 @needs_data
 def test_benchmark_matrices_give_the_benchmark_frequencies() -> None:
     """To 1e-4, the digits that are known."""
-    modes = modes_of(load_building(str(DATA)))
+    modes = modes_of(load_building(str(TOWER)))
     np.testing.assert_allclose(modes.frequency[:5], BENCHMARK_FREQUENCIES, rtol=1e-4)
     np.testing.assert_allclose(modes.ratio[:5], 0.01, rtol=1e-4)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -16,8 +13,7 @@ from scenarios import _bridge_control as control
 from scenarios import highway_bridge as study
 from scenarios._bridge_criteria import NAMES, WEIGHT, criteria, response
 from scenarios._bridge_printed import printed
-
-DATA = Path(os.environ["BENCHMARK_DATA"]) / "highway_bridge" if "BENCHMARK_DATA" in os.environ else None
+from tests.benchmark_data import BRIDGE, needs_data
 
 
 def made_up(scale):
@@ -125,11 +121,11 @@ def test_a_step_that_does_not_converge_is_told_with_element_time_and_residual():
 
 
 @pytest.mark.long
-@pytest.mark.skipif(DATA is None, reason="BENCHMARK_DATA names no folder with the benchmark's files")
+@needs_data
 def test_table_of_the_full_model():
     """The network is below 1 in at least 80 % of the cells of displacement, moment and bearing that the
     thesis prints below 1 (found: 47 of 48), and every legible cell is computed."""
-    rows = study.table(data=DATA, controllers=("lqg", "scwnn"))
+    rows = study.table(data=BRIDGE, controllers=("lqg", "scwnn"))
     assert len(rows) == 6 * 2 * 21
     for row in rows:
         assert row["computed"] is not None or row["criterion"] == "J21"

@@ -1,7 +1,5 @@
 """The tall building: printed figures, orderings, criteria, and the force that the observer uses."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,13 +10,10 @@ from scenarios import tall_building
 from scenarios._tower_coupling import coupling_errors
 from scenarios._tower_criteria import NAMES, PRINTED, UNCONTROLLED, Reference, criteria
 from scenarios._tower_design import PERIOD, reduced_model
+from tests.benchmark_data import TOWER, needs_data
 
-DATA = Path(__file__).parents[2] / "../shared/data/tall_building/mck.npz"
 
-
-@pytest.mark.parametrize(
-    "data", [None, pytest.param(str(DATA), marks=pytest.mark.skipif(not DATA.exists(), reason="no data"))]
-)
+@pytest.mark.parametrize("data", [None, pytest.param(str(TOWER), marks=needs_data)])
 def test_uncontrolled_response_is_the_printed_one(data: str | None) -> None:
     """The four figures within 3 %, as the study asks; 900 s."""
     figures = tall_building.reference(data=data).figures()
@@ -133,9 +128,7 @@ def test_model_keeps_the_five_modes_and_the_damper() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "data", [None, pytest.param(str(DATA), marks=pytest.mark.skipif(not DATA.exists(), reason="no data"))]
-)
+@pytest.mark.parametrize("data", [None, pytest.param(str(TOWER), marks=needs_data)])
 def test_tables_keep_the_printed_orderings(data: str | None) -> None:
     """Tables 2.1 and 2.2 whole: what filtering does, what a does to J1 to J4, and the hardware limits.
 
