@@ -312,6 +312,9 @@ class Continuous(Participant):
         carry the states from t to t + h, inputs held. The one given here is the
         classical Runge-Kutta method (ode4) in equal substeps of at most `max_step`;
         a class with an exact solution overrides it.
+
+    A class with an `advance` and no `derivatives` (an implicit method, say) runs under
+    sampled coupling and leaves as a Co-Simulation FMU; stage coupling refuses it.
     """
 
     KERNELS = ("initialize", "derivatives", "outputs", "advance")
@@ -321,10 +324,10 @@ class Continuous(Participant):
     integrator_work = Local(0.0, "stages of advance", shape=(3, "n_states"))
 
     def __init__(self, **values: Any) -> None:
-        if not hasattr(type(self), "derivatives"):
+        if not hasattr(type(self), "derivatives") and type(self).advance is Continuous.advance:
             raise DeclarationError(
-                f"{type(self).__name__} has no derivatives(self, t); a Continuous needs it "
-                "(what has no continuous state is a Block)"
+                f"{type(self).__name__} has no derivatives(self, t); a Continuous needs it, or an advance "
+                "of its own (what has no continuous state is a Block)"
             )
         super().__init__(**values)
 
@@ -336,11 +339,13 @@ class Continuous(Participant):
         derived: dict[str, Variable] = {}
         for name, state in declared.items():
             derived[name] = state
-            if state.kind == "state":
-                if f"der_{name}" in declared:
-                    raise DeclarationError(
-                        f"{cls.__name__}: 'der_{name}' is the derivative of '{name}'; rename one of them"
-                    )
+            if state.kind != "state":
+                continue
+            if f"der_{name}" in declared:
+                raise DeclarationError(
+                    f"{cls.__name__}: 'der_{name}' is the derivative of '{name}'; rename one of them"
+                )
+            if hasattr(cls, "derivatives"):
                 unit = None if state.unit is None else f"({state.unit})/s"
                 derived[f"der_{name}"] = Variable(
                     "derivative", 0.0, f"derivative of {name}", unit, state.shape, name=f"der_{name}"

@@ -26,7 +26,7 @@ from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
 from .loop import loop_ir
 from .opcodes import COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
-from .participant import Block
+from .participant import Block, Continuous
 from .system import Connection, Port, System, cycle_text, is_block
 from .tableaus import TABLEAUS
 from .variables import Array
@@ -106,6 +106,11 @@ class Program:
 
     def _instance(self, name: str, member: object, stage: bool, jit: bool, used: set[str]) -> Instance:
         if not isinstance(member, FMU):
+            if stage and isinstance(member, Continuous) and "derivatives" not in member.kernels:
+                raise WiringError(
+                    f"{name} ({type(member).__name__}) moves by its advance alone and has no derivatives, "
+                    'which stage coupling integrates; use coupling="sampled"'
+                )
             return KernelInstance(name, member, jit, self.failures)  # type: ignore[arg-type]
         if stage and member.as_block and (member.every, member.sample_period) == (None, None):
             raise WiringError(

@@ -97,7 +97,8 @@ def _check(participant: Participant, name: str) -> None:
 
 
 def _interfaces(participant: Participant, interfaces: Iterable[str] | None) -> tuple[str, ...]:
-    possible = INTERFACES if isinstance(participant, Continuous) else ("CoSimulation",)
+    continuous = isinstance(participant, Continuous) and "derivatives" in participant.kernels
+    possible = INTERFACES if continuous else ("CoSimulation",)
     chosen = tuple(possible if interfaces is None else dict.fromkeys(interfaces))
     for interface in chosen:
         if interface not in possible:

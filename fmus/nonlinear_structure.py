@@ -213,9 +213,6 @@ class NonlinearStructure(Continuous):
     worst = Local()
     iterations = Local()
 
-    def derivatives(self, t: float) -> None:
-        """None: displacements and the elements' memory move by `advance` alone."""
-
     def outputs(self, t: float) -> None:
         measure(self)
 

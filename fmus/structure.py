@@ -63,7 +63,8 @@ def structure(participant: Participant, kernels: str) -> Structure:
         # What a block computed in its last step is held: nothing depends on an input at once.
         held = {slot: () for kind in ("output", "state") for slot in slots[kind]}
         return Structure({}, held, {} if "initialize" in participant.kernels else held)
-    derivative_of = dict(zip(slots["state"], slots["derivative"], strict=True))
+    with_derivatives = slots["state"] if slots["derivative"] else []  # none: it moves by advance alone
+    derivative_of = dict(zip(with_derivatives, slots["derivative"], strict=True))
     running: dict[int, tuple[int, ...]] = {}
     for name, known in participant.dependencies().items():
         needed = tuple(s for v in variables.values() if v.name in known for s in _slots(v))
@@ -73,14 +74,14 @@ def structure(participant: Participant, kernels: str) -> Structure:
     initial: dict[int, tuple[int, ...]] = {}
     if not parameters and "initialize" not in participant.kernels:
         initial = dict(running)
-    if not _DATA_DEPENDENT.search(_evaluation(participant, kernels)):
+    if unknown and not _DATA_DEPENDENT.search(_evaluation(participant, kernels)):
         known_slots = [*slots["input"], *slots["state"]]
         changed = _changes(participant, load(kernels), unknown, known_slots + parameters[:_MOST_PARAMETERS])
         if changed is not None:
             running = {u: tuple(s for s in known_slots if s in changed[u]) for u in unknown}
             if len(parameters) <= _MOST_PARAMETERS:
                 initial = {u: tuple(sorted(changed[u])) for u in unknown}
-    running |= {slot: (slot,) for slot in derivative_of}  # a state is known, and an output
+    running |= {slot: (slot,) for slot in slots["state"]}  # a state is known, and an output
     return Structure(derivative_of, running, initial)
 
 
