@@ -8,8 +8,9 @@ the three stiffnesses (a low peak, below the first mode, and a broad band).
 
 What this script finds: the two RMS coefficients C_s and C_t for a seed: their ratio from
 sigma_x76/sigma_a75, their level so that the largest and the smallest of the four errors are
-equal and opposite. The peaks then depend on the seed alone; and since 900 s are only some 18 correlation times of a mode with 1 % damping, so
-does the reduction that any control achieves. With a number the script tries so many seeds
+equal and opposite. The peaks then depend on the seed alone; and since 900 s are only some
+18 correlation times of a mode with 1 % damping, so does the reduction that any control
+achieves. With a number the script tries so many seeds
 and lists those whose peaks are within 3 %. The default seed 722 is the one of the first
 1100 with which LQG comes nearest to its printed criteria: its uncontrolled building
 swings about 1.15 times as much as the same spectrum gives on average, which the
