@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import sys
 import typing
 from collections.abc import Callable, Sequence
@@ -125,8 +126,13 @@ def _table_command(scenario: Scenario) -> Callable[..., None]:
     return _with_options(scenario.function("table"), body, json=(json_type, False))
 
 
-def _as_json(rows: Any) -> str:
-    return json.dumps(rows, indent=1, default=float)
+def _as_json(rows: list[dict[str, Any]]) -> str:
+    """Return rows as JSON; JSON has no NaN and no infinity, so what is not finite is null."""
+
+    def plain(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return json.dumps([{n: plain(v) for n, v in row.items()} for row in rows], indent=1, default=float)
 
 
 def _with_progress(

@@ -103,6 +103,16 @@ def test_table_as_json_is_a_list_of_rows(capsys):
     assert {"case", "gain", "coupling", "norm_u", "mean_sgn"} <= rows[0].keys()
 
 
+def test_json_has_null_where_a_number_is_not_finite(tmp_path, capsys):
+    path = tmp_path / "tabled.py"
+    rows = "[{'a': 1.5, 'b': float('nan'), 'c': 'x'}, {'a': float('inf'), 'b': 2, 'c': None}]"
+    path.write_text(f"def table():\n    return {rows}\n")
+    assert call("table", path, "--json") == 0
+    text = capsys.readouterr().out
+    assert "NaN" not in text
+    assert json.loads(text) == [{"a": 1.5, "b": None, "c": "x"}, {"a": None, "b": 2, "c": None}]
+
+
 def test_export_and_inspect(scenario, tmp_path, capsys):
     path = tmp_path / "mass.fmu"
     assert call("export", f"{scenario}:mass", "--out", path) == 0
