@@ -62,12 +62,14 @@ class Fmi3(Adapter):
 
         self.flags = np.zeros(3, dtype=np.uint8)  # what fmi3DoStep says: event, terminate, early return
         self.last_time = np.zeros(1)
+        self.configured = False  # then arrays, and so states, may be of another size than described
         self.api.instantiate(loggingOn=True, logMessage=log)
 
     def configure(self, values: Mapping[str, Sequence[Any]]) -> None:
         """Set structural parameters in configuration mode."""
         if not values:
             return
+        self.configured = True
         component = self.api.component
         self.attempt("enter configuration mode", lambda: self.api.fmi3EnterConfigurationMode(component))
         for name, value in values.items():
@@ -85,7 +87,10 @@ class Fmi3(Adapter):
         return self.api.updateDiscreteStates()  # type: ignore[no-any-return]
 
     def counts(self) -> tuple[int, int]:
-        """Return what the instance says: structural parameters may have changed the numbers."""
+        """Return the numbers of the model description, or the instance's if it was configured."""
+        if not self.configured:
+            description = self.fmu.description
+            return int(description.numberOfContinuousStates), int(description.numberOfEventIndicators)
         states = self.attempt("count its states", self.api.getNumberOfContinuousStates)
         return int(states), int(self.attempt("count its events", self.api.getNumberOfEventIndicators))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -31,16 +32,20 @@ _EVENT_ITERATIONS = 1000  # at one instant; more is a chain of events without en
 
 
 class _Exchange:
-    """The ports of one FMI type: value references, and a buffer of floats over all of them."""
+    """The ports of one FMI type and variability: value references, and a buffer of floats."""
 
-    def __init__(self, access: str, number: Number, ports: list[FMUPort]) -> None:
+    def __init__(self, access: str, number: Number, discrete: bool, ports: list[FMUPort]) -> None:
         self.access = access
+        #: can change at events only, where there are events
+        self.discrete = discrete
         self.number = number
         self.references = np.array([v.valueReference for p in ports for v in p.variables], dtype=np.uint32)
         self.elements = [e for p in ports for e in p.elements()]
         self.values = buffer(len(self.elements))
         #: what the FMU reads and writes; the floats themselves if it does so in Float64
         self.raw = self.values if number.dtype == "float64" else np.zeros(len(self.elements), number.dtype)
+        #: what the FMU was told last, of discrete inputs
+        self.told = self.raw.copy()
         self.addresses: dict[str, int] = {}
         offset = int(self.values.ctypes.data)
         for p in ports:
@@ -60,17 +65,22 @@ class FMUInstance:
         self.running = False
         #: what the call that ended the run returned; 3 is an error, 4 a fatal one
         self.status = 0
-        self.fmi = fmu.adapter(fmu, name, model_exchange)
-        self.api = self.fmi.api
+        self.used = used
         given = fmu.start_values()
         structural = {n for n in given if fmu.variables[n].causality == "structuralParameter"}
         #: the start values that were given, by variable
         self.start_values = {n: v for n, v in given.items() if n not in structural}
-        self.fmi.configure({n: given[n] for n in structural})
+        self.fmi = fmu.adapter(fmu, name, model_exchange)
+        self.api = self.fmi.api
+        try:
+            self.fmi.configure({n: given[n] for n in structural})
+            self.n_states, self.n_indicators = self.fmi.counts() if model_exchange else (0, 0)
+        except FMUError:
+            self.stop()
+            raise
         self.inputs = self._exchanges(fmu.input_ports)
         self.outputs = self._exchanges({n: p for n, p in fmu.output_ports.items() if n in used})
         self.has_outputs = bool(self.outputs)
-        self.n_states, self.n_indicators = self.fmi.counts() if model_exchange else (0, 0)
         self.states = buffer(self.n_states)
         self.state_address = int(self.states.ctypes.data)
         self.flags = np.zeros(2, dtype=self.fmi.FLAG)
@@ -78,11 +88,14 @@ class FMUInstance:
         self.stages = buffer(5 * self.n_states)
         self.failures = failures
         self.event_callback: Any = None
+        self.input_callbacks: list[Any] = []
 
     def _exchanges(self, ports: dict[str, FMUPort]) -> list[_Exchange]:
-        groups: dict[tuple[str, Number], list[FMUPort]] = {}
+        groups: dict[tuple[str, Number, bool], list[FMUPort]] = {}
         for port in ports.values():
-            groups.setdefault(self.fmi.NUMBERS[port.type], []).append(port)
+            discrete = any(v.variability != "continuous" for v in port.variables)
+            access, number = self.fmi.NUMBERS[port.type]
+            groups.setdefault((access, number, discrete), []).append(port)
         return [_Exchange(*kind, members) for kind, members in groups.items()]
 
     # ------------------------------------------------------------- life of an instance
@@ -93,6 +106,7 @@ class FMUInstance:
         self.running = True
         for x in self.inputs:
             x.values[:] = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
+            x.told[:] = x.values
         if self.model_exchange:
             self._discrete_states(t0)
             self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
@@ -166,10 +180,27 @@ class FMUInstance:
         """Set the inputs."""
         ops = []
         for x in self.inputs:
+            waits = self.model_exchange and x.discrete
+            if waits and not self.used & x.addresses.keys():
+                continue
             if x.raw is not x.values:
                 ops.append(self._convert(FROM_FLOAT, x, x.values, x.raw))
-            ops.append(self._values("Set", x))
+            ops.append(self._event_input(x) if waits else self._values("Set", x))
         return ops
+
+    def _event_input(self, x: _Exchange) -> Op:
+        """Set discrete inputs of Model Exchange when they change, which is an event."""
+
+        def tell(t: float, h: float) -> None:
+            if not np.array_equal(x.raw, x.told):
+                x.told[:] = x.raw
+                values, references = x.raw.tolist(), x.references.tolist()
+                setter = getattr(self.api, f"set{x.access}")
+                self._event(t, lambda: setter(references, values))
+
+        self.input_callbacks.append(self.failures.guard(self.name, tell))
+        address = ctypes.cast(self.input_callbacks[-1], ctypes.c_void_p).value or 0
+        return Op(f"{self.name}: discrete inputs (Python callback)", CALL, address, participant=self.name)
 
     def step(self, fraction: float = 0.0) -> list[Op]:
         """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
@@ -259,12 +290,17 @@ class FMUInstance:
         state_event = bool((signs != self._signs).any())
         time_event = t + 1e-9 * h >= self.event_time[0]
         if state_event or time_event or self.flags[0]:
-            self.fmi.attempt("enter event mode", self.api.enterEventMode)
-            self._discrete_states(t)
-            self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
-            self._get_states()
-            signs = self._indicator_signs()
-        self._signs = signs
+            self._event(t)
+        else:
+            self._signs = signs
+
+    def _event(self, t: float, change: Callable[[], Any] = lambda: None) -> None:
+        self.fmi.attempt("enter event mode", self.api.enterEventMode)
+        self.fmi.attempt("set its discrete inputs", change)
+        self._discrete_states(t)
+        self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
+        self._get_states()
+        self._signs = self._indicator_signs()
 
     def _discrete_states(self, t: float) -> None:
         for _ in range(_EVENT_ITERATIONS):

@@ -303,14 +303,12 @@ class _Run:
         if status < 0 and op.code in checked:
             variable = instance.locate(checked[op.code] + 8 * (-status - 1))
             what = "is not finite (NaN or infinite)"
+            remedy = "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
             if op.code == FROM_FLOAT:
-                what = f"is not {op.number.values}"
+                what, remedy = f"is not {op.number.values}", "round or limit its source in a block"
             elif op.code == TO_FLOAT and not op.number.is_float:
-                what = "is above 2^53, which a float does not hold"
-            text = (
-                f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); "
-                "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
-            )
+                what, remedy = "is above 2^53, which a float does not hold", "do not connect or record it"
+            text = f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); {remedy}"
         elif isinstance(instance, FMUInstance):
             text = instance.failure(op, status, t, program.h) + f" (step {k})"
         else:

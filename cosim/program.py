@@ -84,9 +84,8 @@ class Program:
         self.watched = statistics
         self.coupling = coupling if coupling == "sampled" else f"stage coupling, {solver}"
         stage = coupling != "sampled"
-        used = {
-            (p.participant, p.name) for p in [*record, *statistics, *(c.source for c in system.connections)]
-        }
+        ends = [end for c in system.connections for end in (c.source, c.target)]
+        used = {(p.participant, p.name) for p in [*record, *statistics, *ends]}
         try:
             for name, member in system.participants.items():
                 ports = {port for participant, port in used if participant == name}

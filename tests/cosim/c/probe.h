@@ -7,7 +7,8 @@
      stair counts time events at 0.75, 1.5, ...                       floor(t / 0.75)
      quarters counts step events, one at every fourth completed step
 
-   The simulation is asked to end at end_at; a step past early_at stops there. */
+   The simulation is asked to end at end_at; a step past early_at stops there. In Model Exchange
+   inputs that are not continuous can be set at events only. */
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -21,7 +22,7 @@ struct probe {
     long double in[64]; /* inputs and parameters by value reference; long double holds a 64-bit integer */
     double v[8], time, x, next;
     int n, stair, quarters, steps, label_length, blob_sum;
-    bool step_event, terminated;
+    bool step_event, terminated, continuous_time;
 };
 
 static struct probe *probe_new(void) {

@@ -18,7 +18,7 @@ EXPORT void fmi2FreeInstance(P) { free(p); }
 
 #define SAME(name) EXPORT fmi2Status name(P) { return fmi2OK; }
 SAME(fmi2Reset) SAME(fmi2Terminate) SAME(fmi2EnterInitializationMode) SAME(fmi2ExitInitializationMode)
-SAME(fmi2EnterEventMode) SAME(fmi2EnterContinuousTimeMode) SAME(fmi2SetDebugLogging) SAME(fmi2CancelStep)
+SAME(fmi2SetDebugLogging) SAME(fmi2CancelStep)
 
 #define NOT_THERE(name) EXPORT fmi2Status name(P) { return fmi2Error; }
 NOT_THERE(fmi2GetString) NOT_THERE(fmi2GetFMUstate) NOT_THERE(fmi2SetFMUstate) NOT_THERE(fmi2FreeFMUstate)
@@ -39,7 +39,10 @@ EXPORT fmi2Status fmi2SetupExperiment(P, fmi2Boolean has_tolerance, fmi2Real tol
         return fmi2OK;                                                                                       \
     }                                                                                                        \
     EXPORT fmi2Status fmi2Set##name(P, const unsigned vr[], size_t n, const type values[]) {                 \
-        for (size_t i = 0; i < n; i++) p->in[vr[i]] = values[i];                                             \
+        for (size_t i = 0; i < n; i++) {                                                                     \
+            if (p->continuous_time && vr[i] != R_IN) return fmi2Error;                                       \
+            p->in[vr[i]] = values[i];                                                                        \
+        }                                                                                                    \
         return fmi2OK;                                                                                       \
     }
 VALUES(Real, double)
@@ -71,6 +74,15 @@ EXPORT fmi2Status fmi2GetBooleanStatus(P, fmi2StatusKind kind, fmi2Boolean *valu
 }
 
 /* --- Model Exchange */
+
+EXPORT fmi2Status fmi2EnterEventMode(P) {
+    p->continuous_time = false;
+    return fmi2OK;
+}
+EXPORT fmi2Status fmi2EnterContinuousTimeMode(P) {
+    p->continuous_time = true;
+    return fmi2OK;
+}
 
 EXPORT fmi2Status fmi2NewDiscreteStates(P, fmi2EventInfo *info) {
     probe_event(p);

@@ -18,8 +18,8 @@ EXPORT void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 EXPORT void fmi3FreeInstance(P) { free(p); }
 
 #define SAME(name) EXPORT fmi3Status name(P) { return fmi3OK; }
-SAME(fmi3Reset) SAME(fmi3Terminate) SAME(fmi3ExitInitializationMode) SAME(fmi3EnterEventMode)
-SAME(fmi3EnterContinuousTimeMode) SAME(fmi3SetDebugLogging) SAME(fmi3EnterConfigurationMode)
+SAME(fmi3Reset) SAME(fmi3Terminate) SAME(fmi3ExitInitializationMode)
+SAME(fmi3SetDebugLogging) SAME(fmi3EnterConfigurationMode)
 SAME(fmi3ExitConfigurationMode) SAME(fmi3EvaluateDiscreteStates)
 
 #define NOT_THERE(name) EXPORT fmi3Status name(P) { return fmi3Error; }
@@ -61,6 +61,7 @@ static fmi3Status arrays(struct probe *p, const unsigned vr[], size_t n, size_t 
     EXPORT fmi3Status fmi3Set##name(P, const unsigned vr[], size_t n, const type values[], size_t n_values) {\
         if (arrays(p, vr, n, n_values)) return fmi3Error;                                                    \
         for (size_t i = 0; i < n; i++) {                                                                     \
+            if (p->continuous_time && vr[i] != R_IN && vr[i] != F32_IN && vr[i] != V_IN) return fmi3Error;   \
             if (vr[i] == V_IN)                                                                               \
                 for (int j = 0; j < p->n; j++) p->v[j] = (double)*values++;                                  \
             else if (vr[i] == N)                                                                             \
@@ -109,6 +110,15 @@ EXPORT fmi3Status fmi3DoStep(P, double t, double h, bool no_restore, bool *event
 }
 
 /* --- Model Exchange */
+
+EXPORT fmi3Status fmi3EnterEventMode(P) {
+    p->continuous_time = false;
+    return fmi3OK;
+}
+EXPORT fmi3Status fmi3EnterContinuousTimeMode(P) {
+    p->continuous_time = true;
+    return fmi3OK;
+}
 
 EXPORT fmi3Status fmi3UpdateDiscreteStates(P, bool *again, bool *end, bool *nominals, bool *states, bool *timed,
                                            double *next) {
