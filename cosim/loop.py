@@ -52,84 +52,6 @@ found:
 fine:
   ret i64 0
 }
-
-; y = scale x + offset
-define internal void @scale(ptr %x, ptr %y, i64 %n, double %scale, double %offset) {
-entry:
-  br label %loop
-loop:
-  %i = phi i64 [ 0, %entry ], [ %next, %body ]
-  %go = icmp slt i64 %i, %n
-  br i1 %go, label %body, label %end
-body:
-  %p = getelementptr double, ptr %x, i64 %i
-  %q = getelementptr double, ptr %y, i64 %i
-  %v = load double, ptr %p
-  %s = fmul double %v, %scale
-  %r = fadd double %s, %offset
-  store double %r, ptr %q
-  %next = add i64 %i, 1
-  br label %loop
-end:
-  ret void
-}
-
-; from each of n addresses to a row of floats
-define internal void @record(ptr %addresses, ptr %row, i64 %n) {
-entry:
-  br label %loop
-loop:
-  %i = phi i64 [ 0, %entry ], [ %next, %body ]
-  %go = icmp slt i64 %i, %n
-  br i1 %go, label %body, label %end
-body:
-  %p = getelementptr ptr, ptr %addresses, i64 %i
-  %source = load ptr, ptr %p
-  %v = load double, ptr %source
-  %q = getelementptr double, ptr %row, i64 %i
-  store double %v, ptr %q
-  %next = add i64 %i, 1
-  br label %loop
-end:
-  ret void
-}
-
-; minimum, maximum, sum and sum of squares of the floats at n addresses
-define internal void @watch(ptr %addresses, ptr %kept, i64 %n) {
-entry:
-  br label %loop
-loop:
-  %i = phi i64 [ 0, %entry ], [ %next, %body ]
-  %go = icmp slt i64 %i, %n
-  br i1 %go, label %body, label %end
-body:
-  %p = getelementptr ptr, ptr %addresses, i64 %i
-  %source = load ptr, ptr %p
-  %x = load double, ptr %source
-  %first = getelementptr [4 x double], ptr %kept, i64 %i
-  %low = load double, ptr %first
-  %lower = fcmp olt double %x, %low
-  %newlow = select i1 %lower, double %x, double %low
-  store double %newlow, ptr %first
-  %second = getelementptr i8, ptr %first, i64 8
-  %high = load double, ptr %second
-  %higher = fcmp ogt double %x, %high
-  %newhigh = select i1 %higher, double %x, double %high
-  store double %newhigh, ptr %second
-  %third = getelementptr i8, ptr %first, i64 16
-  %sum = load double, ptr %third
-  %newsum = fadd double %sum, %x
-  store double %newsum, ptr %third
-  %fourth = getelementptr i8, ptr %first, i64 24
-  %squares = load double, ptr %fourth
-  %square = fmul double %x, %x
-  %newsquares = fadd double %squares, %square
-  store double %newsquares, ptr %fourth
-  %next = add i64 %i, 1
-  br label %loop
-end:
-  ret void
-}
 """
 
 _HEAD = """
@@ -179,9 +101,47 @@ class _Writer:
         place = self.value(f"getelementptr i64, ptr %table, i64 {5 * self.row + index}")
         return self.value(f"load ptr, ptr {place}")
 
-    def at(self, base: str, i: int) -> str:
-        """Return the address of float i at a pointer."""
-        return base if i == 0 else self.value(f"getelementptr double, ptr {base}, i64 {i}")
+    def at(self, base: str, i: int | str, stride: int = 1, offset: int = 0) -> str:
+        """Return the address of float `stride i + offset` at a pointer; i is a number or a value."""
+        if isinstance(i, int):
+            index = str(stride * i + offset)
+        else:
+            index = i if stride == 1 else self.value(f"mul i64 {i}, {stride}")
+            index = index if offset == 0 else self.value(f"add i64 {index}, {offset}")
+        return base if index == "0" else self.value(f"getelementptr double, ptr {base}, i64 {index}")
+
+    def load(self, address: str, kind: str = "double") -> str:
+        """Load a float, or a value of another kind."""
+        return self.value(f"load {kind}, ptr {address}")
+
+    def store(self, value: str, address: str) -> None:
+        """Store a float."""
+        self.lines.append(f"  store double {value}, ptr {address}")
+
+    def each(self, n: int, body: Callable[[int | str], None]) -> None:
+        """Write body(i) for i = 0 .. n - 1: one after the other, or as a loop when they are many."""
+        if n <= INLINE:
+            for element in range(n):
+                body(element)
+            return
+        before, loop, inside, end = self.block, self.label(), self.label(), self.label()
+        self.count += 1
+        i, following = f"%i{self.count}", f"%j{self.count}"
+        self.lines.append(f"  br label %{loop}")
+        self.start_block(loop)
+        self.lines.append(f"  {i} = phi i64 [ 0, %{before} ], [ {following}, %{inside} ]")
+        go = self.value(f"icmp slt i64 {i}, {n}")
+        self.lines.append(f"  br i1 {go}, label %{inside}, label %{end}")
+        self.start_block(inside)
+        body(i)
+        self.lines.append(f"  {following} = add i64 {i}, 1\n  br label %{loop}")
+        self.start_block(end)
+
+    def count_up(self, place: str) -> str:
+        """Add 1 to a counter; return what it was."""
+        before = self.load(place, "i64")
+        self.lines.append(f"  store i64 {self.value(f'add i64 {before}, 1')}, ptr {place}")
+        return before
 
     def time(self, fraction: float) -> str:
         """Return t0 + (k + fraction) h."""
@@ -242,15 +202,17 @@ class _Writer:
 def _copy(w: _Writer, op: Op) -> None:
     scale, offset = op.weights or (1.0, 0.0)
     a, b = w.word(1), w.word(2)
-    if (scale, offset) != (1.0, 0.0):
-        factors = f"double {number(scale)}, double {number(offset)}"
-        w.lines.append(f"  call void @scale(ptr {a}, ptr {b}, i64 {op.n}, {factors})")
-    elif op.n > INLINE:
+
+    def one(i: int | str) -> None:
+        x = w.load(w.at(a, i))
+        if (scale, offset) != (1.0, 0.0):
+            x = w.value(f"fadd double {w.value(f'fmul double {x}, {number(scale)}')}, {number(offset)}")
+        w.store(x, w.at(b, i))
+
+    if op.n > INLINE and (scale, offset) == (1.0, 0.0):
         w.lines.append(f"  call void @llvm.memmove.p0.p0.i64(ptr {b}, ptr {a}, i64 {8 * op.n}, i1 false)")
     else:
-        for i in range(op.n):
-            x = w.value(f"load double, ptr {w.at(a, i)}")
-            w.lines.append(f"  store double {x}, ptr {w.at(b, i)}")
+        w.each(op.n, one)
 
 
 def _call(w: _Writer, op: Op) -> None:
@@ -260,61 +222,44 @@ def _call(w: _Writer, op: Op) -> None:
 
 
 def _record(w: _Writer, op: Op) -> None:
-    rows = w.value("load i64, ptr %recorded")
-    offset = w.value(f"mul i64 {rows}, {op.n}")
-    row = w.value(f"getelementptr double, ptr {w.word(2)}, i64 {offset}")
-    addresses = w.word(1)
-    if op.n > INLINE:
-        w.lines.append(f"  call void @record(ptr {addresses}, ptr {row}, i64 {op.n})")
-    for i in range(op.n if op.n <= INLINE else 0):
-        source = w.value(f"load ptr, ptr {w.at(addresses, i)}")
-        w.lines.append(f"  store double {w.value(f'load double, ptr {source}')}, ptr {w.at(row, i)}")
-    w.lines.append(f"  store i64 {w.value(f'add i64 {rows}, 1')}, ptr %recorded")
+    offset = w.value(f"mul i64 {w.count_up('%recorded')}, {op.n}")
+    addresses, row = w.word(1), w.value(f"getelementptr double, ptr {w.word(2)}, i64 {offset}")
+    w.each(op.n, lambda i: w.store(w.load(w.load(w.at(addresses, i), "ptr")), w.at(row, i)))
 
 
 def _statistics(w: _Writer, op: Op) -> None:
     addresses, kept = w.word(1), w.word(2)
-    if op.n > INLINE:
-        w.lines.append(f"  call void @watch(ptr {addresses}, ptr {kept}, i64 {op.n})")
-    for i in range(op.n if op.n <= INLINE else 0):
-        x = w.value(f"load double, ptr {w.value(f'load ptr, ptr {w.at(addresses, i)}')}")
+
+    def one(i: int | str) -> None:
+        x = w.load(w.load(w.at(addresses, i), "ptr"))
         for j, better in enumerate(("olt", "ogt")):
-            old = w.value(f"load double, ptr {w.at(kept, 4 * i + j)}")
-            new = w.value(
-                f"select i1 {w.value(f'fcmp {better} double {x}, {old}')}, double {x}, double {old}"
-            )
-            w.lines.append(f"  store double {new}, ptr {w.at(kept, 4 * i + j)}")
+            place = w.at(kept, i, 4, j)
+            old = w.load(place)
+            beats = w.value(f"fcmp {better} double {x}, {old}")
+            w.store(w.value(f"select i1 {beats}, double {x}, double {old}"), place)
         for j, term in ((2, x), (3, w.value(f"fmul double {x}, {x}"))):
-            total = w.value(f"fadd double {w.value(f'load double, ptr {w.at(kept, 4 * i + j)}')}, {term}")
-            w.lines.append(f"  store double {total}, ptr {w.at(kept, 4 * i + j)}")
-    points = w.value("load i64, ptr %sampled")
-    w.lines.append(f"  store i64 {w.value(f'add i64 {points}, 1')}, ptr %sampled")
+            place = w.at(kept, i, 4, j)
+            w.store(w.value(f"fadd double {w.load(place)}, {term}"), place)
+
+    w.each(op.n, one)
+    w.count_up("%sampled")
 
 
 def _combine(w: _Writer, op: Op) -> None:
-    """c = a + h sum_i w_i b_i, a loop over the vectors; weights of 0 are left out."""
+    """c = a + h sum_i w_i b_i; weights of 0 are left out."""
     a, b, c = w.word(1), w.word(2), w.word(3)
-    before, loop, body, end = w.block, w.label(), w.label(), w.label()
-    w.lines.append(f"  br label %{loop}")
-    w.start_block(loop)
-    w.count += 1
-    i, following = f"%i{w.count}", f"%j{w.count}"
-    w.lines.append(f"  {i} = phi i64 [ 0, %{before} ], [ {following}, %{body} ]")
-    w.lines.append(f"  br i1 {w.value(f'icmp slt i64 {i}, {op.n}')}, label %{body}, label %{end}")
-    w.start_block(body)
-    slope = ""
-    for stage, weight in enumerate(op.weights):
-        if weight != 0.0:
-            index = w.value(f"add i64 {i}, {stage * op.n}")
-            x = w.value(f"load double, ptr {w.value(f'getelementptr double, ptr {b}, i64 {index}')}")
-            term = w.value(f"fmul double {x}, {number(weight)}")
-            slope = w.value(f"fadd double {slope}, {term}") if slope else term
-    start = w.value(f"load double, ptr {w.value(f'getelementptr double, ptr {a}, i64 {i}')}")
-    moved = w.value(f"fadd double {start}, {w.value(f'fmul double %h, {slope}')}") if slope else start
-    w.lines.append(f"  store double {moved}, ptr {w.value(f'getelementptr double, ptr {c}, i64 {i}')}")
-    w.lines.append(f"  {following} = add i64 {i}, 1")
-    w.lines.append(f"  br label %{loop}")
-    w.start_block(end)
+
+    def one(i: int | str) -> None:
+        slope = ""
+        for stage, weight in enumerate(op.weights):
+            if weight != 0.0:
+                term = w.value(f"fmul double {w.load(w.at(b, i, offset=stage * op.n))}, {number(weight)}")
+                slope = w.value(f"fadd double {slope}, {term}") if slope else term
+        start = w.load(w.at(a, i))
+        step = w.value(f"fmul double %h, {slope}") if slope else ""
+        w.store(w.value(f"fadd double {start}, {step}") if slope else start, w.at(c, i))
+
+    w.each(op.n, one)
     w.check_finite(c, op.n)
 
 
@@ -329,9 +274,8 @@ def _from_float(w: _Writer, op: Op) -> None:
 def _gather(w: _Writer, op: Op) -> None:
     pairs = w.word(1)
     for i in range(op.n):
-        source = w.value(f"load ptr, ptr {w.at(pairs, 2 * i)}")
-        target = w.value(f"load ptr, ptr {w.at(pairs, 2 * i + 1)}")
-        w.lines.append(f"  store double {w.value(f'load double, ptr {source}')}, ptr {target}")
+        source, target = (w.load(w.at(pairs, 2 * i + j), "ptr") for j in (0, 1))
+        w.store(w.load(source), target)
 
 
 def _fmi_values(w: _Writer, op: Op) -> None:
