@@ -44,6 +44,12 @@ _REMEDY = {
 }
 
 
+def remedy(symbol: str) -> str:
+    """Return why compiled code cannot have a symbol, and what to do about it."""
+    known = (text for prefix, text in _REMEDY.items() if symbol.startswith(prefix))
+    return next(known, "it is not in libm; call only functions of libm and of cosim.functions")
+
+
 def cache_directory() -> Path:
     """Return the folder for compiled code; the environment variable STRUCTCOSIM_CACHE moves it."""
     chosen = os.environ.get("STRUCTCOSIM_CACHE")
@@ -258,9 +264,7 @@ def _stripped(module: Any, name: str) -> str:
     for function in module.functions:
         symbol = function.name
         if function.is_declaration and not symbol.startswith("llvm.") and symbol not in LIBM:
-            why = next(
-                (text for prefix, text in _REMEDY.items() if symbol.startswith(prefix)), "it is not in libm"
-            )
+            why = remedy(symbol)
             raise CompilationError(f"{name} needs '{symbol}', which is not there without Python: {why}")
     return "\n".join(line for line in str(module).splitlines() if not line.startswith("target ")) + "\n"
 

@@ -25,7 +25,7 @@ import uuid
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cosim.compiler import LIBM, cache_directory, write_atomically
+from cosim.compiler import LIBM, cache_directory, remedy, write_atomically
 from cosim.errors import CosimError
 from cosim.participant import Participant
 from cosim.variables import KINDS, Variable
@@ -37,11 +37,6 @@ _FLAGS = (
     *("-std=c23", "-O2", "-Wall", "-Wextra", "-Wno-override-module", "-g0", "-s"),
     *("-shared", "-fPIC", "-fvisibility=hidden", "-fomit-frame-pointer", "-fno-sanitize=all"),
 )
-_REMEDIES = {
-    "NRT_": "the kernel allocates an array; write into a declared Local instead",
-    "Py": "the kernel needs the Python runtime (an exception, a string, a Python object)",
-    "numba_": "the kernel needs Numba's runtime",
-}
 
 
 class ExportError(CosimError):
@@ -129,10 +124,9 @@ def check_symbols(ir: str, identifier: str) -> None:
         if symbol.startswith("llvm.") or symbol in LIBM:
             continue
         kernels = [name for name in KERNELS if symbol in reachable(ir, name)]
-        why = next((text for start, text in _REMEDIES.items() if symbol.startswith(start)), None)
         raise ExportError(
-            f"{identifier}: kernel {' and '.join(kernels) or '?'} needs '{symbol}', which no FMU has: "
-            + (why or "call only functions of libm and of cosim.functions")
+            f"{identifier}: kernel {' and '.join(kernels) or '?'} needs '{symbol}', "
+            f"which no FMU has: {remedy(symbol)}"
         )
 
 
