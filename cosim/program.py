@@ -25,6 +25,7 @@ from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
 from .loop import loop_ir
+from .model_exchange import ModelExchangeInstance
 from .opcodes import COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
 from .participant import Block, Continuous
 from .system import Connection, Port, System, cycle_text, is_block
@@ -32,6 +33,8 @@ from .tableaus import TABLEAUS
 from .variables import Array
 
 Instance: TypeAlias = KernelInstance | FMUInstance
+#: what stage coupling integrates
+Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
 
 
 def steps_between(period: float, h: float, what: str) -> int:
@@ -124,7 +127,8 @@ class Program:
             )
         model_exchange = (stage and not member.as_block) or not member.has_cs
         self._check_alone(name, member, model_exchange)
-        return FMUInstance(name, member, model_exchange, self.failures, used)
+        kind = ModelExchangeInstance if model_exchange else FMUInstance
+        return kind(name, member, self.failures, used)
 
     def _check_alone(self, name: str, fmu: FMU, model_exchange: bool) -> None:
         description = fmu.description
@@ -256,40 +260,34 @@ class Program:
 
     def _stage_coupling(self, solver: str, delays: dict[int, Array], decimation: int) -> None:
         nodes, rows, weights = TABLEAUS[solver]
-        moving = [n for n in self.instances if not self._is_block(n)]
-        rounds = self._rounds(moving)
-        work = {n: buffer((1 + len(nodes)) * self.instances[n].n_states) for n in moving}
+        moving = {n: i for n, i in self.instances.items() if not self._is_block(n)}
+        integrated = {n: i for n, i in moving.items() if isinstance(i, Integrated)}
+        assert moving == integrated  # _instance sees to it
+        rounds = self._rounds(list(moving))
+        work = {n: buffer((1 + len(nodes)) * i.n_states) for n, i in integrated.items()}
         self.buffers += work.values()
         for stage, (c, row) in enumerate(zip(nodes, rows, strict=True)):
             ops: list[Op] = []
-            for name in moving:
+            for name, instance in integrated.items():
                 if stage > 0:
-                    ops += self._state_of(name, work[name], row, f"{name}: states of stage {stage + 1}")
-                ops += self.instances[name].set_states(c)
+                    ops += _state_of(instance, work[name], row, f"{name}: states of stage {stage + 1}")
+                ops += instance.set_states(c)
             ops += self._evaluation(rounds, delays, c, stage)
             if stage == 0:
                 self.first = [*ops, *self._sinks(decimation), *self._remember(delays)]
-                for name in moving:
-                    instance = self.instances[name]
+                for name, instance in integrated.items():
                     save = Op("", COPY, a=instance.state_address, n=instance.n_states, weights=(1.0, 0.0))
                     self.second.append(replace(save, b=int(work[name].ctypes.data)))
             else:
                 self.second += ops
-            for name in moving:
-                instance = self.instances[name]
+            for name, instance in integrated.items():
                 slopes = int(work[name].ctypes.data) + 8 * instance.n_states * (1 + stage)
                 self.second += self._with_inputs(name, delays)
                 self.second += instance.derivatives(slopes, c)
-        for name in moving:
-            self.second += self._state_of(name, work[name], weights, f"{name}: states at t + h")
-            self.second += [*self.instances[name].set_states(1.0), *self.instances[name].complete()]
+        for name, instance in integrated.items():
+            self.second += _state_of(instance, work[name], weights, f"{name}: states at t + h")
+            self.second += [*instance.set_states(1.0), *instance.complete()]
         self.second += self._release(delays)
-
-    def _state_of(self, name: str, work: Array, weights: tuple[float, ...], text: str) -> list[Op]:
-        instance = self.instances[name]
-        n, base = instance.n_states, int(work.ctypes.data)
-        a, b, c = base, base + 8 * n, instance.state_address
-        return [Op(text, COMBINE, a=a, b=b, c=c, n=n, weights=weights, participant=name)] if n else []
 
     def _with_inputs(self, name: str, delays: dict[int, Array]) -> list[Op]:
         return [*self._copies(name, delays), *self.instances[name].latch()]
@@ -383,6 +381,13 @@ class Program:
 def _copied_as_is(op: Op) -> int:
     """Return the rate of an operation that copies a few floats without a factor, 0 for another one."""
     return op.every if op.code == COPY and op.n <= 8 and op.weights == (1.0, 0.0) else 0
+
+
+def _state_of(instance: Integrated, work: Array, weights: tuple[float, ...], text: str) -> list[Op]:
+    n, a = instance.n_states, int(work.ctypes.data)
+    b, c = a + 8 * n, instance.state_address
+    op = Op(text, COMBINE, a=a, b=b, c=c, n=n, weights=weights, participant=instance.name)
+    return [op] if n else []
 
 
 def _names(ports: list[Port]) -> str:

@@ -1,0 +1,194 @@
+"""A running FMU with Model Exchange: integrated here, its events handled.
+
+Under sampled coupling it is integrated over each communication step by ode4 in equal
+substeps, its inputs held; under stage coupling by the method of all.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from .errors import FMUError, SimulationError
+from .fmu import FMU
+from .fmu_instance import Exchange, FMUInstance
+from .instances import Failures, buffer
+from .opcodes import CALL, COMBINE, COPY, FMI_TIME, FMI_VECTOR, Op
+from .tableaus import TABLEAUS
+
+_EVENT_ITERATIONS = 1000  # at one instant; more is a chain of events without end
+
+
+class ModelExchangeInstance(FMUInstance):
+    """One instance of an FMU in a run, with Model Exchange."""
+
+    model_exchange: ClassVar[bool] = True
+
+    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
+        super().__init__(name, fmu, failures, used)
+        try:
+            self.n_states, self.n_indicators = self.fmi.counts()
+        except FMUError:
+            self.stop()
+            raise
+        self.states = buffer(self.n_states)
+        self.state_address = int(self.states.ctypes.data)
+        self.flags = np.zeros(2, dtype=self.fmi.FLAG)
+        self.event_time = np.array([np.inf])
+        self.stages = buffer(5 * self.n_states)
+        self.event_callback: Any = None
+        self.input_callbacks: list[Any] = []
+
+    def start(self, t0: float) -> None:
+        """Take the FMU through initialization and the events of the start."""
+        super().start(t0)
+        self._discrete_states(t0)
+        self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
+        self._get_states()
+        self._signs = self._indicator_signs()
+
+    # ---------------------------------------------------------------------- operations
+
+    def _set_inputs(self, x: Exchange) -> list[Op]:
+        if not x.discrete:
+            return super()._set_inputs(x)
+        if not self.used & x.addresses.keys():
+            return []
+        return [*self._from_floats(x), self._event_input(x)]
+
+    def _event_input(self, x: Exchange) -> Op:
+        """Set discrete inputs of Model Exchange when they change, which is an event."""
+
+        def tell(t: float, h: float) -> None:
+            if not np.array_equal(x.raw, x.told):
+                x.told[:] = x.raw
+                values, references = x.raw.tolist(), x.references.tolist()
+                setter = getattr(self.api, f"set{x.access}")
+                self._event(t, lambda: setter(references, values))
+
+        self.input_callbacks.append(self.failures.guard(self.name, tell))
+        address = ctypes.cast(self.input_callbacks[-1], ctypes.c_void_p).value or 0
+        return Op(f"{self.name}: discrete inputs (Python callback)", CALL, address, participant=self.name)
+
+    def advance(self) -> list[Op]:
+        """Integrate over the step, by Runge-Kutta over the model's derivatives with its input held."""
+        nodes, rows, weights = TABLEAUS["ode4"]
+        part = 1.0 / self.fmu.substeps
+        base = self.stages.ctypes.data
+        ops = [Op(f"{self.name}: ode4, {self.fmu.substeps} substeps (FMU)", COPY, participant=self.name)]
+        for j in range(self.fmu.substeps):
+            ops.append(Op("", COPY, a=self.state_address, b=base, n=self.n_states, weights=(1.0, 0.0)))
+            for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
+                c = (j + node) * part
+                if i > 0:
+                    ops += [self._combine(base, [part * w for w in row]), *self.set_states(c)]
+                else:
+                    ops += self.set_states(c)
+                ops += self.derivatives(base + 8 * self.n_states * (1 + i), c)
+            ops.append(self._combine(base, [part * w for w in weights]))
+        return [*ops, *self.set_states(1.0), *self.complete()]
+
+    def _combine(self, base: int, weights: list[float]) -> Op:
+        slopes = base + 8 * self.n_states
+        return Op(
+            "", COMBINE, a=base, b=slopes, c=self.state_address, n=self.n_states, weights=tuple(weights)
+        )
+
+    def _vector(self, name: str, address: int) -> Op:
+        n = self.n_states
+        return Op("", FMI_VECTOR, self._function(name), self._component, address, n=n, participant=self.name)
+
+    def set_states(self, fraction: float) -> list[Op]:
+        """Set time and states."""
+        time = self._function(f"{self.fmi.PREFIX}SetTime")
+        ops = [Op("", FMI_TIME, time, self._component, fraction=fraction, participant=self.name)]
+        states = f"{self.fmi.PREFIX}SetContinuousStates"
+        return [*ops, self._vector(states, self.state_address)] if self.n_states else ops
+
+    def derivatives(self, target: int, fraction: float) -> list[Op]:
+        """Get the derivatives into `target`."""
+        return [self._vector(self.fmi.DERIVATIVES, target)] if self.n_states else []
+
+    def complete(self) -> list[Op]:
+        """Tell the model that a step is completed; handle its events."""
+        # always told, even where the model says that it need not be: FMPy reads that flag inverted
+        function = self._function(f"{self.fmi.PREFIX}CompletedIntegratorStep")
+        flags, event_time = int(self.flags.ctypes.data), int(self.event_time.ctypes.data)
+        told = Op(
+            "", self.fmi.COMPLETED, function, self._component, flags, self._events_address(), event_time
+        )
+        ops = [replace(told, fraction=1.0, participant=self.name)]
+        if self.n_indicators:
+            text = f"{self.name}: events (Python callback)"
+            ops.append(Op(text, CALL, self._events_address(), fraction=1.0, participant=self.name))
+        return ops
+
+    def _events_address(self) -> int:
+        if self.event_callback is None:
+            self.event_callback = self.failures.guard(self.name, self._handle_events)
+        return ctypes.cast(self.event_callback, ctypes.c_void_p).value or 0
+
+    # -------------------------------------------------------------------------- events
+
+    def _indicator_signs(self) -> Any:
+        n = self.n_indicators
+        z = buffer(n)
+        if n:
+            pointer = z.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+            self.fmi.attempt("get its event indicators", lambda: self.api.getEventIndicators(pointer, n))
+        return z > 0
+
+    def _handle_events(self, t: float, h: float) -> None:
+        if self.flags[1]:
+            raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s")
+        signs = self._indicator_signs()
+        state_event = bool((signs != self._signs).any())
+        time_event = t + 1e-9 * h >= self.event_time[0]
+        if state_event or time_event or self.flags[0]:
+            self._event(t)
+        else:
+            self._signs = signs
+
+    def _event(self, t: float, change: Callable[[], Any] = lambda: None) -> None:
+        self.fmi.attempt("enter event mode", self.api.enterEventMode)
+        self.fmi.attempt("set its discrete inputs", change)
+        self._discrete_states(t)
+        self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
+        self._get_states()
+        self._signs = self._indicator_signs()
+
+    def _discrete_states(self, t: float) -> None:
+        for _ in range(_EVENT_ITERATIONS):
+            again, end, _, _, timed, time = self.fmi.attempt(
+                "update its discrete states", self.fmi.discrete_states
+            )
+            if end:
+                raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s, in an event")
+            if not again:
+                self.event_time[0] = time if timed else np.inf
+                return
+        raise FMUError(
+            f"{self.name}: the event at t = {t:g} s does not end in {_EVENT_ITERATIONS} iterations"
+        )
+
+    def _get_states(self) -> None:
+        if self.n_states:
+            pointer = self.states.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+            self.fmi.attempt("get its states", lambda: self.api.getContinuousStates(pointer, self.n_states))
+
+    def locate(self, address: int) -> str:
+        """Return the name of the variable or state at an address, for an error message."""
+        found = super().locate(address)
+        state = (address - self.state_address) // 8
+        for unknown in self.fmu.description.derivatives if found == "?" and state >= 0 else []:
+            variable = unknown.variable.derivative
+            n = math.prod(self.fmu.shape_of(variable))
+            if state < n:
+                return str(variable.name) if n == 1 else f"{variable.name}[{state + 1}]"
+            state -= n
+        return found
