@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -16,15 +15,13 @@ import numpy as np
 
 from .errors import FMUError, SimulationError
 from .fmu import FMU
-from .fmu_instance import Exchange, FMUInstance
+from .fmu_events import EventInstance
 from .instances import Failures, buffer
 from .opcodes import CALL, COMBINE, COPY, FMI_TIME, FMI_VECTOR, Op
 from .tableaus import TABLEAUS
 
-_EVENT_ITERATIONS = 1000  # at one instant; more is a chain of events without end
 
-
-class ModelExchangeInstance(FMUInstance):
+class ModelExchangeInstance(EventInstance):
     """One instance of an FMU in a run, with Model Exchange."""
 
     model_exchange: ClassVar[bool] = True
@@ -39,41 +36,17 @@ class ModelExchangeInstance(FMUInstance):
         self.states = buffer(self.n_states)
         self.state_address = int(self.states.ctypes.data)
         self.flags = np.zeros(2, dtype=self.fmi.FLAG)
-        self.event_time = np.array([np.inf])
+        self._signs = buffer(self.n_indicators) > 0
         self.stages = buffer(5 * self.n_states)
         self.event_callback: Any = None
-        self.input_callbacks: list[Any] = []
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and the events of the start."""
         super().start(t0)
         self._discrete_states(t0)
-        self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
-        self._get_states()
-        self._signs = self._indicator_signs()
+        self._resume()
 
     # ---------------------------------------------------------------------- operations
-
-    def _set_inputs(self, x: Exchange) -> list[Op]:
-        if not x.discrete:
-            return super()._set_inputs(x)
-        if not self.used & x.addresses.keys():
-            return []
-        return [*self._from_floats(x), self._event_input(x)]
-
-    def _event_input(self, x: Exchange) -> Op:
-        """Set discrete inputs of Model Exchange when they change, which is an event."""
-
-        def tell(t: float, h: float) -> None:
-            if not np.array_equal(x.raw, x.told):
-                x.told[:] = x.raw
-                values, references = x.raw.tolist(), x.references.tolist()
-                setter = getattr(self.api, f"set{x.access}")
-                self._event(t, lambda: setter(references, values))
-
-        self.input_callbacks.append(self.failures.guard(self.name, tell))
-        address = ctypes.cast(self.input_callbacks[-1], ctypes.c_void_p).value or 0
-        return Op(f"{self.name}: discrete inputs (Python callback)", CALL, address, participant=self.name)
 
     def advance(self) -> list[Op]:
         """Integrate over the step, by Runge-Kutta over the model's derivatives with its input held."""
@@ -152,29 +125,12 @@ class ModelExchangeInstance(FMUInstance):
         if state_event or time_event or self.flags[0]:
             self._event(t)
         else:
-            self._signs = signs
+            self._signs[:] = signs
 
-    def _event(self, t: float, change: Callable[[], Any] = lambda: None) -> None:
-        self.fmi.attempt("enter event mode", self.api.enterEventMode)
-        self.fmi.attempt("set its discrete inputs", change)
-        self._discrete_states(t)
+    def _resume(self) -> None:
         self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
         self._get_states()
-        self._signs = self._indicator_signs()
-
-    def _discrete_states(self, t: float) -> None:
-        for _ in range(_EVENT_ITERATIONS):
-            again, end, _, _, timed, time = self.fmi.attempt(
-                "update its discrete states", self.fmi.discrete_states
-            )
-            if end:
-                raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s, in an event")
-            if not again:
-                self.event_time[0] = time if timed else np.inf
-                return
-        raise FMUError(
-            f"{self.name}: the event at t = {t:g} s does not end in {_EVENT_ITERATIONS} iterations"
-        )
+        self._signs[:] = self._indicator_signs()
 
     def _get_states(self) -> None:
         if self.n_states:
