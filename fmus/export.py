@@ -16,12 +16,13 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from cosim.c_compiler import Platform, host
 from cosim.compiler import lower
 from cosim.errors import CosimError
 from cosim.participant import Block, Continuous, Participant
 
 from .description import DefaultExperiment, fmi2_description, fmi3_description
-from .link import ExportError, Platform, build_model, find_platform, host, link
+from .link import ExportError, build_model, find_platform, link
 from .reference import reference_files
 from .structure import structure
 
@@ -42,7 +43,7 @@ def export(
     """Write a participant, with the values it has now as start values, as a native FMU.
 
     platforms
-        names of `fmus.link.PLATFORMS`; this machine's by default
+        names of `cosim.c_compiler.PLATFORMS`; this machine's by default
     interfaces
         "ModelExchange", "CoSimulation" or both (the default; a Block has Co-Simulation only)
     experiment

@@ -1,31 +1,34 @@
-"""From kernels in LLVM IR to a shared library: `python -m ziglang cc` and a cache.
+"""From kernels in LLVM IR to a shared library.
 
 A library is linked from the kernels of a participant (`cosim.compiler.lower`), the
-front end in fmus/c and one generated C file, the model's table. The C compiler comes
-with the package `ziglang` and links for every platform of `PLATFORMS` from any machine;
-its CPU level is the lowest of each, the C library the oldest that is worth it, so that
-what was linked here runs there. A library is cached by a hash of all that went into it.
+front end in fmus/c and one generated C file, the model's table, for every platform of
+`cosim.c_compiler`. It is cached by a hash of all that went into it.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
-import importlib.util
 import json
 import math
-import os
-import platform as host_platform
 import re
-import subprocess
-import sys
 import tempfile
 import threading
 import uuid
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
-from cosim.compiler import LIBM, cache_directory, remedy, write_atomically
+from cosim.c_compiler import (
+    LIBRARY_FLAGS,
+    PLATFORMS,
+    Platform,
+    cached_library,
+    complaint,
+    fmi_headers,
+    host,
+    zig_cc,
+)
+from cosim.compiler import LIBM, cache_directory, remedy
 from cosim.errors import CosimError
 from cosim.participant import Participant
 from cosim.variables import KINDS, Variable
@@ -33,43 +36,11 @@ from cosim.variables import KINDS, Variable
 KERNELS = ("initialize", "derivatives", "outputs", "advance", "step")
 _FRONT_END = Path(__file__).parent / "c"
 _SHARED_SOURCES = ("core.c", "snapshot.c", "sensitivity.c")
-_FLAGS = (
-    *("-std=c23", "-O2", "-Wall", "-Wextra", "-Wno-override-module", "-g0", "-s"),
-    *("-shared", "-fPIC", "-fvisibility=hidden", "-fomit-frame-pointer", "-fno-sanitize=all"),
-)
+_FLAGS = (*LIBRARY_FLAGS, "-Wno-override-module")
 
 
 class ExportError(CosimError):
     """A participant that cannot leave as an FMU, or a library that cannot be linked."""
-
-
-@dataclass(frozen=True)
-class Platform:
-    """Where a library runs: its name here and in FMI 3.0, the linker's target, FMI 2.0's folder."""
-
-    name: str
-    target: str
-    fmi2_folder: str
-    suffix: str
-
-
-#: FMI 2.0 has one folder per system: see `folders` in fmus/export.py for two architectures at once.
-PLATFORMS = {
-    p.name: p
-    for p in (
-        Platform("x86_64-linux", "x86_64-linux-gnu.2.17", "linux64", ".so"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "linux64", ".so"),
-        Platform("x86_64-windows", "x86_64-windows-gnu", "win64", ".dll"),
-        Platform("x86_64-darwin", "x86_64-macos.11.0", "darwin64", ".dylib"),
-        Platform("aarch64-darwin", "aarch64-macos.11.0", "darwin64", ".dylib"),
-    )
-}
-
-
-def host() -> str:
-    """Return the name of the platform that this runs on."""
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(m := host_platform.machine().lower(), m)
-    return f"{machine}-{host_platform.system().lower()}"
 
 
 def find_platform(name: str) -> Platform:
@@ -206,17 +177,12 @@ def fmi_name(v: Variable) -> str:
 
 def link(model: Model, platform: Platform) -> bytes:
     """Return the shared library of a model for a platform, from the cache if it has been linked before."""
-    if importlib.util.find_spec("ziglang") is None:
-        raise ExportError("no C compiler: the package ziglang is not installed; pip install ziglang")
-    headers = _fmi_headers()
+    headers = fmi_headers()
     ir = _hidden(model.kernels)
-    parts: list[str] = [platform.target, *_FLAGS, model.token, ir, importlib.metadata.version("ziglang")]
+    parts: list[str] = [platform.target, *_FLAGS, model.token, ir]
     parts += [p.read_text() for p in sorted(headers.glob(f"fmi{model.fmi_version[0]}*.h"))]
-    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
-    cached = cache_directory() / "libraries" / f"{key}{platform.suffix}"
-    if not cached.exists():
-        write_atomically(cached, _compile(model, platform, ir, headers))
-    return cached.read_bytes()
+    build = partial(_compile, model, platform, ir, headers)
+    return cached_library(parts, platform.suffix, build).read_bytes()
 
 
 def _compile(model: Model, platform: Platform, ir: str, headers: Path) -> bytes:
@@ -231,19 +197,11 @@ def _compile(model: Model, platform: Platform, ir: str, headers: Path) -> bytes:
         arguments += [f"-I{headers}", f"-I{_FRONT_END}", f"--embed-dir={folder}"]
         arguments += [] if platform.suffix == ".dll" else ["-lm"]
         arguments += [folder / "model.c", folder / "kernels.ll", "-o", library]
-        done = _zig_cc(arguments, folder)
+        done = zig_cc(arguments, folder)
         if done.returncode or not library.exists():
-            raise ExportError(_explain(model.identifier, platform, done.stderr))
+            said = complaint(done.stderr)
+            raise ExportError(f"{model.identifier} cannot be linked for {platform.name}: {said}")
         return library.read_bytes()
-
-
-def _zig_cc(arguments: list[str | Path], folder: Path) -> subprocess.CompletedProcess[str]:
-    zig = str(cache_directory() / "zig")
-    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig}
-    return subprocess.run(
-        [sys.executable, "-m", "ziglang", "cc", *map(str, arguments)],
-        capture_output=True, text=True, env=environment, cwd=folder, check=False,
-    )  # fmt: skip
 
 
 def warm_up() -> None:
@@ -257,7 +215,7 @@ def warm_up() -> None:
             source = Path(name) / "nothing.c"
             source.write_text("double sin(double); double f(double x) { return sin(x); }\n")
             arguments: list[str | Path] = ["-target", PLATFORMS[host()].target, *_FLAGS, source, "-lm"]
-            _zig_cc([*arguments, "-o", Path(name) / "nothing"], Path(name))
+            zig_cc([*arguments, "-o", Path(name) / "nothing"], Path(name))
 
     if not (cache_directory() / "zig").exists() and host() in PLATFORMS:
         threading.Thread(target=link_nothing, daemon=True).start()
@@ -267,18 +225,3 @@ def _unit(model: Model) -> str:
     """Return all C code as one unit: zones and kernels are constants in it, a step is 1.4 times faster."""
     front = [f'#include "{source.name}"' for source in _sources(model.fmi_version)]
     return "\n".join([f'#define MODEL_TOKEN "{model.token}"', model.table, *front, ""])
-
-
-def _explain(identifier: str, platform: Platform, stderr: str) -> str:
-    lines = [line.strip() for line in stderr.splitlines() if "error" in line or "undefined symbol" in line]
-    said = "; ".join(lines[:4]) or stderr.strip()[-400:] or "the compiler said nothing"
-    return f"{identifier} cannot be linked for {platform.name}: {said}"
-
-
-def _fmi_headers() -> Path:
-    """Return the folder of the FMI headers: FMPy carries them."""
-    spec = importlib.util.find_spec("fmpy")
-    folder = Path(spec.origin).parent / "c-code" if spec and spec.origin else Path("c-code")
-    if not (folder / "fmi2Functions.h").exists():
-        raise ExportError("the FMI headers are missing: they come with the package fmpy; pip install fmpy")
-    return folder
