@@ -5,9 +5,10 @@ from cosim import Block, Continuous, FMU, Input, Output, Parameter, State, Syste
 
 from .errors import CosimError
 from .fmu import FMU
-from .master import Interrupted, schedule, simulate
+from .master import schedule, simulate
 from .participant import Block, Continuous, LinearContinuous
 from .result import Result
+from .simulation import Interrupted, Simulation, Snapshot
 from .system import System
 from .variables import Array, Input, Local, Output, Parameter, State
 
@@ -24,6 +25,8 @@ __all__ = [
     "Output",
     "Parameter",
     "Result",
+    "Simulation",
+    "Snapshot",
     "State",
     "System",
     "schedule",

@@ -140,7 +140,7 @@ def _with_progress(
 ) -> Any:
     """Call a function of a scenario, with a progress bar if it takes one; keep an unfinished result."""
     from .errors import SimulationError
-    from .master import Interrupted
+    from .simulation import Interrupted
 
     try:
         if "progress" not in inspect.signature(function).parameters:

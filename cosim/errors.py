@@ -42,6 +42,10 @@ class TimeError(CosimError):
     """A step, stop time or sample period that does not fit the communication grid."""
 
 
+class SnapshotError(CosimError):
+    """A state that cannot be saved or returned to."""
+
+
 class SimulationError(CosimError):
     """A run that had to stop. What was computed until then is in `result`."""
 

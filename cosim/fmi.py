@@ -41,14 +41,14 @@ class Adapter(ABC):
         self.messages: list[str] = []
         self.model_exchange = model_exchange
         description = fmu.description
-        interface = description.modelExchange if model_exchange else description.coSimulation
+        self.interface = description.modelExchange if model_exchange else description.coSimulation
         try:
             # FMPy goes to the library's folder and stays there when it does not load
             with chdir(fmu.directory):
                 self.api: Any = self._class(model_exchange)(
                     guid=description.guid,
                     unzipDirectory=str(fmu.directory),
-                    modelIdentifier=interface.modelIdentifier,
+                    modelIdentifier=self.interface.modelIdentifier,
                     instanceName=name,
                 )
         except Exception as error:  # FMPy raises bare Exception when a library does not load

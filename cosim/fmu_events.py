@@ -31,6 +31,10 @@ class EventInstance(FMUInstance):
         self.event_time = np.array([np.inf])
         self.input_callbacks: list[Any] = []
 
+    def arrays(self) -> list[Any]:
+        """Return the memory that belongs to the state of this instance."""
+        return [*super().arrays(), self.event_time]
+
     @abstractmethod
     def _resume(self) -> None:
         """Leave event mode."""

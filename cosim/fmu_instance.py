@@ -54,6 +54,8 @@ class FMUInstance:
         #: what the call that ended the run returned; 3 is an error, 4 a fatal one
         self.status = 0
         self.used = used
+        #: states of the FMU that were got and not freed
+        self.kept: list[Any] = []
         given = fmu.start_values()
         structural = {n for n in given if fmu.variables[n].causality == "structuralParameter"}
         #: the start values that were given, by variable
@@ -101,7 +103,53 @@ class FMUInstance:
             except Exception as error:  # the run is over; an FMU that cannot terminate is reported, not fatal
                 self.fmi.messages.append(f"[warning] terminate failed: {error}")
         self.running = False
+        for pointer in self.kept:
+            self.api.freeFMUState(pointer)
         self.api.freeInstance()
+
+    @property
+    def can_save(self) -> bool:
+        """Tell whether the FMU can get and set its state."""
+        return bool(self.fmi.interface.canGetAndSetFMUstate)
+
+    @property
+    def can_serialise(self) -> bool:
+        """Tell whether the FMU can give its state as bytes."""
+        return bool(self.can_save and self.fmi.interface.canSerializeFMUstate)
+
+    def save(self, serialised: bool = True) -> tuple[list[Any], Any]:
+        """Return the buffers, and the state of the FMU: as bytes if it can, else kept until `stop`."""
+        state = self.fmi.attempt("get its state", self.api.getFMUState)
+        if serialised and self.can_serialise:
+            serialise = self.api.serializeFMUState
+            kept = self.fmi.attempt("serialise its state", lambda: serialise(state))
+            self.fmi.attempt("free its state", lambda: self.api.freeFMUState(state))
+        else:
+            kept = state
+            self.kept.append(state)
+        return [array.copy() for array in self.arrays()], kept
+
+    def restore(self, saved: tuple[list[Any], Any]) -> None:
+        """Return to what `save` returned, which stays as it is."""
+        arrays, kept = saved
+        state = kept
+        if isinstance(kept, bytes):
+            deserialise = self.api.deserializeFMUState
+            state = self.fmi.attempt("read its state", lambda: deserialise(kept))
+        self.fmi.attempt("set its state", lambda: self.api.setFMUState(state))
+        if isinstance(kept, bytes):
+            self.fmi.attempt("free its state", lambda: self.api.freeFMUState(state))
+        for array, values in zip(self.arrays(), arrays, strict=True):
+            array[:] = values
+
+    def forget(self, saved: tuple[list[Any], Any]) -> None:
+        """Free a state that was kept."""
+        self.kept.remove(saved[1])
+        self.fmi.attempt("free its state", lambda: self.api.freeFMUState(saved[1]))
+
+    def arrays(self) -> list[Any]:
+        """Return the memory that belongs to the state of this instance."""
+        return [array for x in [*self.inputs, *self.outputs] for array in (x.values, x.raw, x.told)]
 
     def failure(self, op: Op, status: int, t: float, h: float) -> str:
         """Return what it means that an operation ended with a status, and remember it for the end."""

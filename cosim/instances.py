@@ -34,6 +34,10 @@ class Failures:
         #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
         self.interrupted = False
 
+    def clear(self) -> None:
+        """Forget what happened: the simulation goes on from where it stands, or from a snapshot."""
+        self.exception, self.interrupted = None, False
+
     def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
         """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""
 
@@ -136,6 +140,21 @@ class KernelInstance:
 
     def stop(self) -> None:
         """Nothing to release."""
+
+    #: Python can be copied, and so can the record
+    can_save = can_serialise = True
+
+    def save(self) -> tuple[Array, dict[str, Any]]:
+        """Return a copy of the record, and of what a block in Python keeps beside it."""
+        attributes = {} if self.is_compiled else self.participant.own_attributes()
+        return self.participant.memory.copy(), attributes
+
+    def restore(self, saved: tuple[Array, dict[str, Any]]) -> None:
+        """Take back what `save` returned, which stays as it is."""
+        memory, attributes = saved
+        self.participant.memory[:] = memory
+        if not self.is_compiled:
+            self.participant.take_attributes(attributes)
 
     def address(self, port: str) -> int:
         """Return the address of a variable."""

@@ -5,11 +5,12 @@ run to run, the addresses, comes from a table of five words a row (function, a, 
 So systems of one shape share one text, which is compiled once a process, in hundredths
 of a second and without Numba.
 
-    i32 run(ptr table, i64 k0, i64 k1, i64 last, double t0, double h, ptr report)
+    i32 run(ptr table, i64 k0, i64 k1, i64 last, double t0, double h, ptr report, i64 resume)
 
 runs the points k0 <= k < k1 of a system whose last point is `last`: at every point the
 first operations, at every point but the last the second ones as well, which carry the
-system to the next. An operation with `fraction` c runs at t = t0 + (k + c) h.
+system to the next. With `resume` the first ones have run at k0 already, as at the end of
+the run that is resumed. An operation with `fraction` c runs at t = t0 + (k + c) h.
 
 report: five int64, row and k where it stopped, status there, recorded rows, sampled
 points. It returns 0, or 1 when an operation failed; then the status is what the function
@@ -24,6 +25,7 @@ from . import conversions, opcodes
 from .conversions import number
 from .opcodes import Op
 
+_MAY_RETURN = "0"  # noSetFMUStatePriorToCurrentPoint: a simulation may return to a snapshot
 INLINE = 8  # up to so many floats an operation is written out, above it is a loop
 
 _LIBRARY = """
@@ -55,8 +57,9 @@ fine:
 """
 
 _HEAD = """
-define i32 @run(ptr %table, i64 %k0, i64 %k1, i64 %last, double %t0, double %h, ptr %report) {
+define i32 @run(ptr %table, i64 %k0, i64 %k1, i64 %last, double %t0, double %h, ptr %report, i64 %resume) {
 entry:
+  %resumes = icmp ne i64 %resume, 0
   %recorded = getelementptr i64, ptr %report, i64 3
   %sampled = getelementptr i64, ptr %report, i64 4
   br label %point
@@ -66,6 +69,10 @@ point:
   br i1 %go, label %begin, label %done
 begin:
   %kf = sitofp i64 %k to double
+  %start = icmp eq i64 %k, %k0
+  %skip = and i1 %start, %resumes
+  br i1 %skip, label %carry, label %act
+act:
 """
 
 
@@ -76,7 +83,7 @@ class _Writer:
         self.lines: list[str] = []
         self.count = 0
         self.row = 0
-        self.block = "begin"
+        self.block = "act"
         self.failures: list[tuple[str, int, str]] = []
         self.library: dict[str, str] = {}
 
@@ -289,14 +296,14 @@ def _fmi_values(w: _Writer, op: Op) -> None:
 
 
 def _fmi2_do_step(w: _Writer, op: Op) -> None:
-    w.check_fmi(w.call("ptr double double i32", w.word(1), w.time(op.fraction), w.step(op), "1"))
+    w.check_fmi(w.call("ptr double double i32", w.word(1), w.time(op.fraction), w.step(op), _MAY_RETURN))
 
 
 def _fmi3_do_step(w: _Writer, op: Op) -> None:
     event, terminate, early = (w.value(f"getelementptr i8, ptr {w.word(2)}, i64 {i}") for i in range(3))
     times = (w.time(op.fraction), w.step(op))
     kinds = "ptr double double i32 ptr ptr ptr ptr"
-    w.check_fmi(w.call(kinds, w.word(1), *times, "1", event, terminate, early, w.word(3)))
+    w.check_fmi(w.call(kinds, w.word(1), *times, _MAY_RETURN, event, terminate, early, w.word(3)))
     status = "0"
     for flag, code in ((early, opcodes.EARLY_RETURN), (terminate, opcodes.TERMINATED)):
         is_set = w.value(f"icmp ne i8 {w.value(f'load i8, ptr {flag}')}, 0")
@@ -316,7 +323,7 @@ def _fmi_completed(w: _Writer, op: Op) -> None:
     boolean = "i32" if op.code == opcodes.FMI2_COMPLETED else "i8"
     flags = w.word(2)
     second = w.value(f"getelementptr {boolean}, ptr {flags}, i64 1")
-    w.check_fmi(w.call("ptr i32 ptr ptr", w.word(1), "1", flags, second))
+    w.check_fmi(w.call("ptr i32 ptr ptr", w.word(1), _MAY_RETURN, flags, second))
     t = w.time(op.fraction)
     almost = w.value(f"fadd double {t}, {w.value(f'fmul double %h, {number(1e-9)}')}")
     due = w.value(f"fcmp oge double {almost}, {w.value(f'load double, ptr {w.word(4)}')}")

@@ -46,6 +46,10 @@ class ModelExchangeInstance(EventInstance):
         self._discrete_states(t0)
         self._resume()
 
+    def arrays(self) -> list[Any]:
+        """Return the memory that belongs to the state of this instance."""
+        return [*super().arrays(), self.states, self.flags, self._signs]
+
     # ---------------------------------------------------------------------- operations
 
     def advance(self) -> list[Op]:

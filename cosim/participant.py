@@ -29,6 +29,8 @@ from .variables import KINDS, Array, Local, Parameter, Variable
 #: kernels, and how many of (t, h) each takes
 KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
 _VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
+#: what every instance has of its own, and no copy may share
+_BOUND = {"memory", "variables", "zones", "_views", *_VECTORS}
 _RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
 #: size names that a Continuous works out itself
 _AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
@@ -40,6 +42,13 @@ def whole_number(what: str, value: Any) -> int:
     if not (number.is_integer() and number >= 1.0):
         raise DeclarationError(f"{what}={value!r} is no whole number, 1 or more")
     return int(number)
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy; an open file and the like cannot be copied and is shared."""
+    with contextlib.suppress(TypeError):
+        return copy.deepcopy(value)
+    return value
 
 
 def rate(where: str, every: Any, sample_period: Any) -> tuple[int | None, float | None]:
@@ -237,11 +246,19 @@ class Participant:
         """Return a copy with a record of its own: what a run works on, so that runs repeat."""
         other = copy.copy(self)
         other._bind(self.memory.copy())
-        bound = {"memory", "variables", "zones", "_views", *_VECTORS}
-        for name in vars(self).keys() - bound:
-            with contextlib.suppress(TypeError):  # an open file and the like cannot be copied and is shared
-                setattr(other, name, copy.deepcopy(vars(self)[name]))
+        other.take_attributes(self.own_attributes())
         return other
+
+    def own_attributes(self) -> dict[str, Any]:
+        """Return copies of what Python keeps on the instance beside the declared variables."""
+        return {n: _copied(vars(self)[n]) for n in vars(self).keys() - _BOUND}
+
+    def take_attributes(self, attributes: Mapping[str, Any]) -> None:
+        """Take copies of what `own_attributes` returned, in place of what there is."""
+        for name in vars(self).keys() - _BOUND - attributes.keys():
+            delattr(self, name)
+        for name, value in attributes.items():
+            setattr(self, name, _copied(value))
 
     # ----------------------------------------------------------------- kernels
 

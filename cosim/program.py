@@ -12,26 +12,39 @@ sample period at the communication points only.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+import ctypes
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import groupby
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from .errors import TimeError, WiringError
+from .errors import SimulationError, TimeError, WiringError
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
 from .loop import loop_ir
 from .model_exchange import ModelExchangeInstance
-from .opcodes import COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
+from .opcodes import (
+    CALL,
+    COMBINE,
+    COPY,
+    FMI2_VALUES,
+    FMI3_VALUES,
+    FROM_FLOAT,
+    GATHER,
+    RECORD,
+    STATISTICS,
+    TO_FLOAT,
+    Op,
+)
 from .participant import Block, Continuous
 from .system import Connection, Port, System, cycle_text, is_block
 from .tableaus import TABLEAUS
 from .variables import Array
 
+Table: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 Instance: TypeAlias = KernelInstance | FMUInstance
 #: what stage coupling integrates
 Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
@@ -51,14 +64,6 @@ def steps_between(period: float, h: float, what: str) -> int:
             f"it must be a whole number of them: choose a step such as {near:.6g} s"
         )
     return steps
-
-
-@dataclass
-class Signals:
-    """Ports to record or to keep statistics of, as addresses of single floats."""
-
-    ports: list[Port]
-    addresses: Array
 
 
 class Program:
@@ -95,11 +100,12 @@ class Program:
                 self.instances[name] = self._instance(name, member, stage, jit, ports)
             self.order = system.block_order()
             self.rates = {name: self._rate(name) for name in self.order}
-            delays = self._delays()
+            #: memory of the connections that are one step late, by their index
+            self.delays = self._delays()
             if stage:
-                self._stage_coupling(solver, delays, decimation)
+                self._stage_coupling(solver, self.delays, decimation)
             else:
-                self._sampled_coupling(delays, decimation)
+                self._sampled_coupling(self.delays, decimation)
         except BaseException:
             self.close()
             raise
@@ -216,27 +222,28 @@ class Program:
 
     # ----------------------------------------------------------------- recorded signals
 
-    def _signals(self, ports: Iterable[Port]) -> Signals:
-        ports = list(ports)
-        addresses = [self._address(p) + 8 * i for p in ports for i in range(p.count)]
-        table = np.array(addresses or [0], dtype=np.int64)
-        self.buffers.append(table)  # type: ignore[arg-type]
-        return Signals(ports, table)  # type: ignore[arg-type]
+    def _addresses(self, ports: list[Port]) -> Table:
+        """Return the addresses of the single floats of ports."""
+        return np.array([self._address(p) + 8 * i for p in ports for i in range(p.count)], dtype=np.int64)
+
+    def values(self, addresses: Table) -> Array:
+        """Return the floats at addresses."""
+        return np.array([ctypes.c_double.from_address(int(a)).value for a in addresses])
 
     def _sinks(self, decimation: int) -> list[Op]:
-        """Return the operations that record and keep statistics; the master sets the record buffer."""
-        record, watch = self._signals(self.recorded), self._signals(self.watched)
-        n = sum(p.count for p in record.ports)
-        m = sum(p.count for p in watch.ports)
-        self.statistics = np.tile([np.inf, -np.inf, 0.0, 0.0], (max(m, 1), 1))
+        """Return the operations that record and keep statistics; `record_to` sets the record buffer."""
+        self.recorded_addresses = self._addresses(self.recorded)
+        self.watched_addresses = self._addresses(self.watched)
+        self.columns, m = len(self.recorded_addresses), len(self.watched_addresses)
+        self.statistics = buffer(4 * m)[: 4 * m].reshape(m, 4)
         ops = []
         if m:
-            a, b = int(watch.addresses.ctypes.data), int(self.statistics.ctypes.data)
-            ops.append(Op(f"statistics of {_names(watch.ports)}", STATISTICS, a=a, b=b, n=m))
-        if n:
-            a = int(record.addresses.ctypes.data)
-            ops.append(Op(f"record {_names(record.ports)}", RECORD, a=a, n=n, every=decimation))
-        self.columns = n
+            a, b = int(self.watched_addresses.ctypes.data), int(self.statistics.ctypes.data)
+            ops.append(Op(f"statistics of {_names(self.watched)}", STATISTICS, a=a, b=b, n=m))
+        if self.columns:
+            a = int(self.recorded_addresses.ctypes.data)
+            text = f"record {_names(self.recorded)}"
+            ops.append(Op(text, RECORD, a=a, n=self.columns, every=decimation))
         return ops
 
     # ----------------------------------------------------------------- sampled coupling
@@ -340,19 +347,20 @@ class Program:
                 rounds[-1][name] = after_inputs or rounds[-1].get(name, False)
         return rounds
 
-    # ------------------------------------------------------------------------- as text
+    # ------------------------------------------------------------------------- the loop
 
-    def loop(self, data: Array) -> tuple[str, np.ndarray[tuple[int, int], np.dtype[np.int64]]]:
-        """Return the loop as LLVM IR and the table of its operands; recorded rows go to `data`.
-
-        `rows` are the operations as they stand in it.
-        """
-        first = self._merged(self.first)
-        first = [replace(op, b=data.ctypes.data) if op.code == RECORD else op for op in first]
-        second = self._merged(self.second)
+    def loop(self) -> tuple[str, Table]:
+        """Return the loop as LLVM IR and the table of its operands; `rows` are the operations in it."""
+        first, second = self._merged(self.first), self._merged(self.second)
         self.rows = [*first, *second]
         table = np.array([op.operands() for op in self.rows], dtype=np.int64)
         return loop_ir(first, second), table
+
+    def record_to(self, table: Table, data: Array) -> None:
+        """Set where the loop puts recorded rows."""
+        for row, op in enumerate(self.rows):
+            if op.code == RECORD:
+                table[row, 2] = data.ctypes.data
 
     def _merged(self, ops: list[Op]) -> list[Op]:
         """Join neighbouring copies of a few floats to one operation: less to look up for the loop."""
@@ -366,6 +374,45 @@ class Program:
             self.buffers.append(table)  # type: ignore[arg-type]
             merged.append(Op("", GATHER, a=int(table.ctypes.data), n=len(pairs), every=plain))
         return merged
+
+    # ------------------------------------------------------------------------- failures
+
+    def error(self, row: int, start: float, k: int, status: int) -> SimulationError:
+        """Return what it means that the operation in a row failed at point k with a status."""
+        failures = self.failures
+        if failures.exception is not None:
+            where, t = failures.participant, failures.time
+            what = f"{type(failures.exception).__name__}: {failures.exception}"
+            asked = isinstance(failures.exception, SimulationError)  # an FMU's: place and time are in it
+            text = str(failures.exception) if asked else f"{where} failed at t = {t:g} s: {what}"
+            error = SimulationError(text)
+            error.__cause__ = failures.exception
+            return error
+        op = self.rows[row]
+        t = op.seconds(start, k, self.h)
+        instance = self.instances[op.participant]
+        values = {FMI2_VALUES: op.c, FMI3_VALUES: op.c, FROM_FLOAT: op.a, TO_FLOAT: op.b}
+        checked = {CALL: op.b, COMBINE: op.c, **values}
+        if status < 0 and op.code in checked:
+            variable = instance.locate(checked[op.code] + 8 * (-status - 1))
+            what = "is not finite (NaN or infinite)"
+            remedy = "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
+            if op.code == FROM_FLOAT:
+                what, remedy = f"is not {op.number.values}", "round or limit its source in a block"
+            elif op.code == TO_FLOAT and not op.number.is_float:
+                what, remedy = "is above 2^53, which a float does not hold", "do not connect or record it"
+            text = f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); {remedy}"
+        elif isinstance(instance, FMUInstance):
+            text = instance.failure(op, status, t, self.h) + f" (step {k})"
+        else:
+            why = "an exception in its kernel; run with jit=False to see where"
+            text = f"{op.participant} failed at t = {t:g} s (step {k}) with {why}"
+        log = instance.log()[-8:]
+        if log:
+            text += "\n  log of the FMU:" + "".join(f"\n  {line}" for line in log)
+        return SimulationError(text)
+
+    # ------------------------------------------------------------------------- as text
 
     def schedule(self) -> str:
         """Return the schedule of one communication step, a line an operation."""

@@ -39,8 +39,8 @@ from controllers.state_dependent import StateDependentGain
 from controllers.switching import HysteresisControl, SaturationControl
 from cosim import Block, Result, System, simulate
 from cosim.blocks import RecordSource, SensorDynamics, WeightedSum, WhiteNoise, function_source
-from cosim.master import Coupling
 from cosim.records import G, el_centro
+from cosim.simulation import Coupling
 from fmus.cached import as_fmu
 from fmus.oscillator import Oscillator
 

@@ -1,0 +1,442 @@
+"""A run that can be stopped and carried on, returned to an earlier point, and branched.
+
+    with Simulation(system, step=0.01) as simulation:
+        simulation.run(5.0)
+        there = simulation.snapshot()
+        one = simulation.run(10.0)
+        simulation.restore(there)
+        same = simulation.run(10.0)
+
+Time is the integer k, t_k = start + k step; nothing is summed up. What happens at a
+communication point is in program.py, and `Result.schedule` shows it for the run.
+`simulate` (master.py) is one run from start to stop.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import shutil
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from numbers import Integral, Real
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+
+from .compiler import load
+from .errors import RecordError, SimulationError, SnapshotError, TimeError, WiringError, did_you_mean
+from .fmu import FMU
+from .instances import Failures
+from .program import Program, Table, steps_between
+from .result import Result, Statistics
+from .system import Port, System, inputs_of, outputs_of
+from .tableaus import TABLEAUS
+from .variables import Array
+
+Coupling = Literal["sampled", "continuous"]
+Solver = Literal["ode1", "ode2", "ode3", "ode4"]
+
+#: recorded signals above this many bytes go to a temporary file
+MEMORY_LIMIT = 200_000_000
+_REPORT = 5
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a run; `result` holds what was computed until then."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__(f"interrupted at t = {result.time[-1] if len(result.time) else 0.0:g} s")
+        self.result = result
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All that a simulation knows at a communication point.
+
+    time
+        of the point, in s
+    portable
+        False when an FMU cannot serialise its state: then the snapshot serves only the
+        simulation that it was taken of, while that is open
+    """
+
+    time: float
+    portable: bool
+    #: k, and whether the outputs at k have been evaluated
+    place: tuple[int, bool]
+    parts: dict[str, Any]
+    delays: list[Array]
+    owner: object
+
+
+class Simulation:
+    """A system at a communication point. Options as for `simulate`.
+
+    Raises CosimError for what can be checked before the run. To be closed, or used in
+    a `with` statement: it holds instances of FMUs.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        step: float,
+        start: float = 0.0,
+        coupling: Coupling = "sampled",
+        solver: Solver = "ode3",
+        record: Iterable[str] | None = None,
+        statistics: Iterable[str] | None = None,
+        decimation: int = 1,
+        jit: bool = True,
+    ) -> None:
+        check_time(step, start)
+        check_choices(coupling, solver, decimation)
+        self.system = system
+        self.step, self.start, self.decimation = float(step), float(start), int(decimation)
+        self._options: dict[str, Any] = {
+            "coupling": coupling,
+            "solver": solver,
+            "record": None if record is None else _names(record),
+            "statistics": None if statistics is None else _names(statistics),
+            "jit": jit,
+        }
+        recorded = _ports(system, self._options["record"])
+        watched = recorded if statistics is None else _ports(system, self._options["statistics"])
+        self._program = Program(system, self.step, coupling, solver, recorded, watched, self.decimation, jit)
+        self._report = np.zeros(_REPORT, dtype=np.int64)
+        self._loop: Callable[..., int] | None = None
+        self._table: Table = np.zeros((0, 5), dtype=np.int64)
+        #: the point that comes next, or, once its outputs have been evaluated, the present one
+        self._k, self._acted = 0, False
+        self._incomplete = self._closed = False
+        self._token = object()
+        self._first = 0
+        self._data: Array = np.empty((0, 0))
+        self._began = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Terminate and free the FMUs; results stay."""
+        if not self._closed:
+            self._closed = True
+            self._program.close()
+
+    @property
+    def time(self) -> float:
+        """The communication point at which the simulation stands, in s."""
+        return self.start + self._k * self.step
+
+    # ----------------------------------------------------------------------------- runs
+
+    def run(self, until: float, progress: Callable[[int, int], None] | None = None) -> Result:
+        """Run from the present communication point to `until`, in s; both are in the result.
+
+        Raises SimulationError (with `result`, what was computed) when a participant fails
+        or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C.
+        """
+        check_time(self.step, self.start, until)
+        last = steps_between(until - self.start, self.step, "the time from start to stop")
+        if last < self._k or (last == self._k and self._acted):
+            raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
+        with _ctrl_c(self._program.failures):
+            self._check_usable("run")
+            self._open_records(last)
+            return self._run(self._begun(), last, progress)
+
+    def _begun(self) -> Callable[..., int]:
+        """Return the loop; the first time, compile it and initialize the participants."""
+        if self._loop is None:
+            ir, self._table = self._program.loop()
+            self._loop = _compiled(ir)
+            self._incomplete = True
+            self._began = time.perf_counter()
+            for instance in self._program.instances.values():
+                instance.start(self.start)
+                if self._program.failures.exception is not None:
+                    raise self._error(0, 0, 0)
+            self._incomplete = False
+        return self._loop
+
+    def _open_records(self, last: int) -> None:
+        """Make room for what is recorded from here on; the present point is the first if it was computed."""
+        program = self._program
+        self._data = self._room(last)
+        self._first = self._k
+        self._report[:] = 0
+        program.statistics[:] = np.inf, -np.inf, 0.0, 0.0
+        if self._acted:
+            x = program.values(program.watched_addresses)
+            if len(x):
+                program.statistics[:] = np.column_stack([x, x, x, x * x])
+            self._report[4] = 1
+            if self._k % self.decimation == 0:
+                self._data[0] = program.values(program.recorded_addresses)
+                self._report[3] = 1
+
+    def _room(self, last: int) -> Array:
+        rows = last // self.decimation - -(-self._k // self.decimation) + 1
+        columns = self._program.columns
+        size = rows * columns * 8
+        if size <= MEMORY_LIMIT:
+            return np.empty((rows, columns))
+        folder = tempfile.gettempdir()
+        free = shutil.disk_usage(folder).free
+        if size > free:
+            raise RecordError(
+                f"{columns} numbers at {rows} points take {size / 1e9:.3g} GB and {folder} has "
+                f"{free / 1e9:.3g} GB free; record fewer ports (record=[...]), or with decimation="
+            )
+        file = tempfile.TemporaryFile(prefix="structcosim-")  # noqa: SIM115  lives as long as the arrays
+        return np.memmap(file, dtype=np.float64, mode="w+", shape=(rows, columns))
+
+    def _run(
+        self, loop: Callable[..., int], last: int, progress: Callable[[int, int], None] | None
+    ) -> Result:
+        program = self._program
+        program.record_to(self._table, self._data)
+        self._began = time.perf_counter()
+        begin, chunk = self._k, 1  # grows: a slow callback must not hold up progress and Ctrl-C
+        table, report = self._table.ctypes.data, self._report.ctypes.data
+        self._incomplete = True  # until the loop is back
+        try:
+            while self._k < last or not self._acted:
+                until = min(self._k + chunk, last + 1)
+                before = time.perf_counter()
+                failed = loop(table, self._k, until, last, self.start, self.step, report, int(self._acted))
+                if failed:
+                    self._k, self._acted = int(self._report[1]), False
+                    if isinstance(program.failures.exception, KeyboardInterrupt):
+                        raise program.failures.exception
+                    raise self._error(*(int(x) for x in self._report[:3]))
+                self._acted = until > last
+                self._k = min(until, last)
+                if program.failures.interrupted:
+                    self._incomplete = False
+                    raise KeyboardInterrupt
+                took = time.perf_counter() - before
+                chunk = max(1, min(int(chunk * 0.1 / max(took, 1e-6)), 4 * chunk, 1_000_000))
+                if progress is not None:
+                    progress(self._k - begin, last - begin)
+        except KeyboardInterrupt:
+            program.failures.clear()
+            raise Interrupted(self._result(interrupted=True)) from None
+        self._incomplete = False
+        return self._result()
+
+    # ------------------------------------------------------------------------ snapshots
+
+    def snapshot(self) -> Snapshot:
+        """Return all that the simulation knows now; `restore` returns to it, as often as you like.
+
+        Raises SnapshotError, naming them, when FMUs cannot get and set their state.
+        """
+        self._check_usable("take a snapshot")
+        self._begun()
+        unable = self._unable("can_save")
+        if unable:
+            raise SnapshotError(
+                f"{unable} cannot get and set its state (canGetAndSetFMUState), which a snapshot needs; "
+                "export it with that capability, or run again from the start"
+            )
+        parts = {name: instance.save() for name, instance in self._program.instances.items()}
+        portable = all(instance.can_serialise for instance in self._program.instances.values())
+        delays = [memory.copy() for memory in self._program.delays.values()]
+        return Snapshot(self.time, portable, (self._k, self._acted), parts, delays, self._token)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Return to a snapshot; what was recorded since then stays in the results that were returned."""
+        self._check_open("restore a snapshot")
+        if snapshot.owner is not self._token and not snapshot.portable:
+            raise SnapshotError(
+                f"the snapshot at t = {snapshot.time:g} s serves only the simulation that it was taken of: "
+                f"{self._unable('can_serialise')} cannot serialise its state"
+            )
+        self._begun()
+        for name, instance in self._program.instances.items():
+            instance.restore(snapshot.parts[name])
+        for memory, kept in zip(self._program.delays.values(), snapshot.delays, strict=True):
+            memory[:] = kept
+        self._k, self._acted = snapshot.place
+        self._incomplete = False
+        self._program.failures.clear()
+
+    def branch(self) -> Simulation:
+        """Return a second simulation that stands where this one does, and goes its own way.
+
+        Raises SnapshotError, naming them, when FMUs cannot serialise their state.
+        """
+        snapshot = self.snapshot()
+        if not snapshot.portable:
+            raise SnapshotError(
+                f"{self._unable('can_serialise')} cannot serialise its state (canSerializeFMUState), "
+                "which a second simulation needs; snapshot and restore serve within one simulation"
+            )
+        other = Simulation(
+            self.system, step=self.step, start=self.start, decimation=self.decimation, **self._options
+        )
+        try:
+            other.restore(snapshot)
+        except BaseException:
+            other.close()
+            raise
+        return other
+
+    def _unable(self, capability: str) -> str:
+        found = [n for n, i in self._program.instances.items() if not getattr(i, capability)]
+        return ", ".join(found)
+
+    def _check_open(self, what: str) -> None:
+        if self._closed:
+            raise SimulationError(f"this simulation cannot {what}: it is closed; make a new one")
+
+    def _check_usable(self, what: str) -> None:
+        self._check_open(what)
+        if self._incomplete:
+            raise SimulationError(
+                f"this simulation cannot {what}: it ended within a step; restore a snapshot, or start anew"
+            )
+
+    # ---------------------------------------------------------------------------- ends
+
+    def _result(self, interrupted: bool = False) -> Result:
+        program = self._program
+        rows = int(self._report[3])
+        signals: dict[str, Array] = {}
+        column = 0
+        for port in program.recorded:
+            part = self._data[:rows, column : column + port.count]
+            signals[str(port)] = part[:, 0] if port.shape == () or port.count == 1 else part
+            column += port.count
+        first = -(-self._first // self.decimation)
+        k = (first + np.arange(rows, dtype=np.float64)) * self.decimation
+        return Result(
+            time=self.start + k * self.step,
+            signals=signals,
+            units={str(p): p.unit for p in [*program.recorded, *program.watched]},
+            statistics=self._statistics(),
+            step=self.step,
+            steps=self._k - self._first,
+            seconds=time.perf_counter() - self._began,
+            schedule=program.schedule(),
+            interrupted=interrupted,
+        )
+
+    def _statistics(self) -> dict[str, Statistics]:
+        n = int(self._report[4])
+        found: dict[str, Statistics] = {}
+        if n == 0:
+            return found
+        row = 0
+        for port in self._program.watched:
+            low, high, total, squares = self._program.statistics[row : row + port.count].T.copy()
+            row += port.count
+            values: list[Any] = [low, high, total / n, np.sqrt(squares / n), np.sqrt(squares)]
+            if port.shape == () or port.count == 1:
+                values = [float(v[0]) for v in values]
+            found[str(port)] = Statistics(*values)
+        return found
+
+    def _error(self, row: int, k: int, status: int) -> SimulationError:
+        error = self._program.error(row, self.start, k, status)
+        error.result = self._result(interrupted=True)
+        return error
+
+
+# --------------------------------------------------------------------------------- checks
+
+
+def check_time(step: float, start: float, stop: float | None = None) -> None:
+    """Refuse what is no step, no start or no stop, in s."""
+    named = {"step": step, "start": start} | ({} if stop is None else {"stop": stop})
+    for name, value in named.items():
+        if not isinstance(value, Real) or not math.isfinite(value):
+            raise TimeError(f"{name}={value!r} is no finite number of seconds")
+    if step <= 0.0:
+        raise TimeError(f"step={step:g} s; a communication step is above zero")
+    if stop is not None and stop <= start:
+        raise TimeError(f"stop={stop:g} s is not after start={start:g} s")
+
+
+def check_choices(coupling: str, solver: str, decimation: int) -> None:
+    """Refuse a coupling, a solver or a decimation that is not known."""
+    if coupling not in ("sampled", "continuous"):
+        raise TimeError(
+            f"coupling '{coupling}' is not known" + did_you_mean(coupling, ["sampled", "continuous"])
+        )
+    if solver not in TABLEAUS:
+        raise TimeError(f"solver '{solver}' is not known" + did_you_mean(solver, TABLEAUS))
+    if not isinstance(decimation, Integral) or decimation < 1:
+        raise TimeError(f"decimation={decimation!r} is no whole number of steps, 1 or more")
+
+
+def _names(names: Iterable[str]) -> list[str]:
+    if isinstance(names, str):
+        raise WiringError(f"'{names}' is one name; give a list of ports, [\"{names}\"]")
+    return list(names)
+
+
+def _ports(system: System, names: list[str] | None) -> list[Port]:
+    if names is None:
+        return [
+            system.port(f"{name}.{port}", "output")
+            for name, member in system.participants.items()
+            for port in (member.declared_outputs if isinstance(member, FMU) else outputs_of(member))
+        ]
+    return [_readable(system, name) for name in names]
+
+
+def _readable(system: System, name: str) -> Port:
+    """Find a port to record: an output, a state, or an input (the value that was used)."""
+    where, _, port = name.partition(".")
+    if where in system.participants and port.partition("[")[0] in inputs_of(system.participants[where]):
+        return system.port(name, "input")
+    return system.port(name, "output")
+
+
+# ----------------------------------------------------------------------------------- loop
+
+
+def _compiled(ir: str) -> Callable[..., int]:
+    """Return the loop of a system as a function."""
+    integer, real, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+    kinds = (pointer, integer, integer, integer, real, real, pointer, integer)
+    function: Callable[..., int] = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(ir)("run"))
+    return function
+
+
+@contextmanager
+def _ctrl_c(failures: Failures) -> Iterator[None]:
+    """Let Ctrl-C end the run between chunks or after a callback.
+
+    Raised at any moment it may strike while Python enters a callback from C, where the
+    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def note(number: int, frame: object) -> None:
+        if failures.interrupted:
+            raise KeyboardInterrupt
+        failures.interrupted = True
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

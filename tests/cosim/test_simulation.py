@@ -1,0 +1,177 @@
+"""A simulation that is carried on, returned to a snapshot, and branched: the same numbers, bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cosim import FMU, Block, Input, Output, Simulation, State, System, simulate
+from cosim.blocks import SensorDynamics, WhiteNoise
+from cosim.errors import SimulationError, SnapshotError, TimeError
+from fmus.export import export
+
+from .parts import Gain, Mass
+from .probe import probe
+from .test_fmu import Chain
+
+
+class Remembers(Block):
+    """A block in Python: a running sum beside the declared variables."""
+
+    compiled = False
+    x = Input()
+    y = Output()
+
+    def __init__(self) -> None:
+        self.seen: list[float] = []
+        super().__init__()
+
+    def step(self, t: float, h: float) -> None:
+        self.seen.append(self.x)
+        self.y = sum(self.seen) / len(self.seen)
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("chains")
+    return {v: export(Chain(), folder / f"chain{v[0]}.fmu", fmi_version=v) for v in ("2.0", "3.0")}
+
+
+def loop(plant) -> System:
+    """Everything that has a state: plant, noise, sensor, a block in Python, a delayed connection."""
+    system = System(
+        {
+            "plant": plant,
+            "noise": WhiteNoise(sigma=[0.2], seed=3, sample_period=0.01),
+            "sensor": SensorDynamics(n=1),
+            "mean": Remembers(),
+            "g": Gain(K=-0.8),
+        },
+        [
+            ("plant.x[2]", "sensor.u"),
+            ("sensor.y", "mean.x"),
+            ("noise.y", "plant.u[2]"),
+            ("g.u", "plant.u[1]"),
+        ],
+    )
+    system.connect("mean.y", "g.x", initial=0.3)
+    return system
+
+
+RECORD = ["plant.a", "plant.x", "noise.y", "sensor.y", "mean.y", "g.u"]
+KINDS = ["python", "2.0", "3.0"]
+COUPLINGS = [{}, {"coupling": "continuous", "solver": "ode4"}]
+
+
+def plant_of(kind, paths):
+    return Chain() if kind == "python" else FMU(paths[kind])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_a_run_in_pieces_is_the_run_in_one(kind, coupling, paths):
+    """Exactly: pieces share the last point of one and the first of the next."""
+    system = loop(plant_of(kind, paths))
+    whole = simulate(system, step=0.01, stop=1.0, record=RECORD, decimation=3, **coupling)
+    with Simulation(system, step=0.01, record=RECORD, decimation=3, **coupling) as simulation:
+        pieces = [simulation.run(until) for until in (0.07, 0.08, 0.51, 1.0)]
+        assert simulation.time == 1.0
+    rows = [
+        slice(0, 3),
+        slice(3, 3),
+        slice(3, 18),
+        slice(17, 34),
+    ]  # points 0..7, 7..8, 8..51, 51..100, every third
+    for piece, part in zip(pieces, rows, strict=True):
+        assert np.array_equal(piece.time, whole.time[part])
+        for name in RECORD:
+            assert np.array_equal(piece[name], whole[name][part]), name
+    assert sum(p.steps for p in pieces) == whole.steps == 100
+    peaks = [p.statistics["g.u"].peak for p in pieces]
+    assert max(peaks) == whole.statistics["g.u"].peak
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_a_snapshot_is_returned_to_exactly_and_a_branch_goes_its_own_way(kind, coupling, paths):
+    with Simulation(loop(plant_of(kind, paths)), step=0.01, record=RECORD, **coupling) as simulation:
+        simulation.run(0.3)
+        there = simulation.snapshot()
+        first = simulation.run(0.9)
+        for _ in range(2):  # as often as one likes
+            simulation.restore(there)
+            assert simulation.time == there.time == 0.3
+            again = simulation.run(0.9)
+            assert all(np.array_equal(first[name], again[name]) for name in RECORD)
+        simulation.restore(there)
+        with simulation.branch() as branch:
+            other = branch.run(0.6)  # in turns: neither sees the other
+            simulation.run(0.4)
+            rest = branch.run(0.9)
+        for name in RECORD:
+            assert np.array_equal(np.concatenate([other[name], rest[name][1:]]), first[name]), name
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(1, 9)), max_size=8))
+@settings(max_examples=25, deadline=None)
+def test_any_walk_of_runs_and_returns_ends_where_the_straight_run_ends(walk):
+    system = System({"m": Mass(), "g": Gain(K=-2.0)}, [("m.x", "g.x"), ("g.u", "m.u")])
+    straight = simulate(system, step=0.1, stop=10.0)["m.x"]
+    with Simulation(system, step=0.1) as simulation:
+        k, kept = 0, simulation.snapshot()
+        for back, n in walk:
+            if back:
+                simulation.restore(kept)
+                k = round(kept.time * 10)
+            else:
+                k += n
+                assert simulation.run(0.1 * k)["m.x"][-1] == straight[k]
+                kept = simulation.snapshot() if n % 2 else kept
+
+
+def test_a_simulation_goes_on_after_a_failure_only_from_a_snapshot():
+    class Fails(Block):
+        compiled = False
+        y = Output()
+        armed = State(0.0)
+
+        def step(self, t, h):
+            if self.armed and t > 0.55:
+                raise ValueError("too late")
+            self.y = t
+
+    with Simulation(System({"f": Fails(armed=1.0)}), step=0.1) as simulation:
+        simulation.run(0.3)
+        there = simulation.snapshot()
+        with pytest.raises(SimulationError, match="too late") as caught:
+            simulation.run(1.0)
+        assert caught.value.result["f.y"] == pytest.approx([0.3, 0.4, 0.5])
+        with pytest.raises(SimulationError, match="ended within a step; restore a snapshot"):
+            simulation.run(1.0)
+        with pytest.raises(SimulationError, match="cannot take a snapshot: it ended within a step"):
+            simulation.snapshot()
+        simulation.restore(there)
+        assert simulation.run(0.5)["f.y"] == pytest.approx([0.3, 0.4, 0.5])
+    with pytest.raises(SimulationError, match="it is closed; make a new one"):
+        simulation.run(1.0)
+
+
+def test_participants_that_cannot_keep_their_state_are_named(tmp_path):
+    system = System({"theirs": FMU(probe(tmp_path / "p.fmu", "2.0")), "m": Mass()})
+    with Simulation(system, step=0.1) as simulation:
+        simulation.run(0.2)
+        with pytest.raises(SnapshotError, match="theirs cannot get and set its state"):
+            simulation.snapshot()
+        assert simulation.run(0.4).time[-1] == pytest.approx(0.4)
+
+
+def test_running_back_is_refused():
+    with Simulation(System({"m": Mass()}), step=0.1) as simulation:
+        simulation.run(0.5)
+        with pytest.raises(TimeError, match=r"the simulation is at 0\.5 s already"):
+            simulation.run(0.4)
+        with pytest.raises(TimeError, match=r"0\.64 s is 6\.4 communication steps"):
+            simulation.run(0.64)
+        assert simulation.run(0.6).steps == 1
