@@ -12,14 +12,51 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from .errors import FMUError
 from .fmu_ports import Shape
-from .opcodes import EARLY_RETURN, TERMINATED, Number
+from .opcodes import TERMINATED, Number
+from .variables import Array
 
 if TYPE_CHECKING:
     from .fmu import FMU
 
 _LABELS = {1: "warning", 2: "discard", 3: "error", 4: "fatal", 5: "pending"}
+
+
+class StepAnswer:
+    """What fmi3DoStep answers, in memory that the loop hands to it."""
+
+    def __init__(self) -> None:
+        #: event handling needed, terminate, early return
+        self.flags = np.zeros(3, dtype=np.uint8)
+        #: the last successful time, and when the next time event is due
+        self.times = np.array([0.0, np.inf])
+
+    @property
+    def event(self) -> bool:
+        """Whether the FMU asks for event handling."""
+        return bool(self.flags[0])
+
+    @property
+    def terminate(self) -> bool:
+        """Whether the FMU asks to end the simulation."""
+        return bool(self.flags[1])
+
+    @property
+    def event_time(self) -> Array:
+        """When the next time event is due, as (1,)."""
+        return self.times[1:]
+
+    def came_to(self, until: float) -> float:
+        """Return how far a step until `until` came."""
+        return min(float(self.times[0]), until) if self.flags[2] else until
+
+    def take(self, event: bool, terminate: bool, early: bool, last: float) -> None:
+        """Keep what FMPy's doStep returned."""
+        self.flags[:] = event, terminate, early
+        self.times[0] = last
 
 
 class Adapter(ABC):
@@ -40,6 +77,8 @@ class Adapter(ABC):
         self.name = name
         self.messages: list[str] = []
         self.model_exchange = model_exchange
+        #: where doStep answers, from FMI 3.0 on
+        self.answer: StepAnswer | None = None
         description = fmu.description
         self.interface = description.modelExchange if model_exchange else description.coSimulation
         try:
@@ -93,11 +132,7 @@ class Adapter(ABC):
 
     @abstractmethod
     def end_of_step(self, status: int) -> tuple[int, float | None]:
-        """Return what a failed step was (TERMINATED, EARLY_RETURN, or its status), and how far it came."""
-
-    def step_answers(self) -> tuple[int, int]:
-        """Return the addresses of the flags and of the time that doStep answers with, if it does."""
-        return 0, 0
+        """Return what a failed step was (TERMINATED, or its status), and how far it came."""
 
     def set(self, variable: Any, values: Sequence[Any]) -> None:
         """Set the values of a variable."""
@@ -131,11 +166,6 @@ class Adapter(ABC):
         reached = "" if last is None else f" (it came to t = {last:g} s)"
         if status == TERMINATED:
             return f"{self.name} asked to end the simulation in the step from t = {t:g} s{reached}"
-        if status == EARLY_RETURN:
-            return (
-                f"{self.name} returned early from its step of {h:g} s from t = {t:g} s{reached}, which was "
-                "not allowed to it; a step that it takes as a whole is needed: try another step="
-            )
         label = _LABELS.get(status)
         named = f"{self.PREFIX}{label.capitalize()}" if label else f"status {status}"
         return f"{self.name} failed {where} with {named}; look at its inputs and at its log"

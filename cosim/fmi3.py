@@ -1,7 +1,7 @@
 """FMI 3.0: the adapter.
 
-Co-Simulation is used without event mode and without early return: a step is taken as a
-whole. Structural parameters that are given are set in configuration mode, at the start.
+A Co-Simulation FMU may return early from a step, and has an event mode where the FMU says
+so. Structural parameters that are given are set in configuration mode, at the start.
 """
 
 from __future__ import annotations
@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from .errors import FMUError
-from .fmi import Adapter
+from .fmi import Adapter, StepAnswer
 from .fmu_ports import Shape
-from .opcodes import EARLY_RETURN, FMI3_COMPLETED, FMI3_DO_STEP, FMI3_VALUES, NUMBERS, TERMINATED, Number
+from .opcodes import FMI3_COMPLETED, FMI3_DO_STEP, FMI3_VALUES, NUMBERS, TERMINATED, Number
 
 
 class Fmi3(Adapter):
@@ -60,10 +58,16 @@ class Fmi3(Adapter):
         def log(_: Any, status: int, category: bytes, message: bytes) -> None:
             self.note(status, message)
 
-        self.flags = np.zeros(3, dtype=np.uint8)  # what fmi3DoStep says: event, terminate, early return
-        self.last_time = np.zeros(1)
+        self.answer = StepAnswer()
         self.configured = False  # then arrays, and so states, may be of another size than described
-        self.api.instantiate(loggingOn=True, logMessage=log)
+        if self.model_exchange:
+            self.api.instantiate(loggingOn=True, logMessage=log)
+            return
+        can = self.fmu.description.coSimulation
+        early = can.mightReturnEarlyFromDoStep or can.canReturnEarlyAfterIntermediateUpdate
+        self.api.instantiate(
+            loggingOn=True, logMessage=log, eventModeUsed=self.fmu.event_mode, earlyReturnAllowed=early
+        )
 
     def configure(self, values: Mapping[str, Sequence[Any]]) -> None:
         """Set structural parameters in configuration mode."""
@@ -98,10 +102,7 @@ class Fmi3(Adapter):
         """Get values."""
         return self.attempt("get its inputs", lambda: getattr(self.api, f"get{access}")(references, count))  # type: ignore[no-any-return]
 
-    def step_answers(self) -> tuple[int, int]:
-        """Return the addresses of event, terminate, early return and of the last successful time."""
-        return int(self.flags.ctypes.data), int(self.last_time.ctypes.data)
-
     def end_of_step(self, status: int) -> tuple[int, float | None]:
         """Return the status that the loop made of the flags, and the last successful time."""
-        return status, float(self.last_time[0]) if status in (TERMINATED, EARLY_RETURN) else None
+        assert self.answer is not None
+        return status, float(self.answer.times[0]) if status == TERMINATED else None

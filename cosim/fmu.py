@@ -46,6 +46,10 @@ class FMU:
     as_block
         acts as a Block does, at communication points in the order of the connections: set
         inputs, doStep from t_k, get outputs at t_k; what a Block that was exported needs
+    event_mode
+        Co-Simulation of FMI 3.0: events are handled here, at the instant of the event, and
+        discrete inputs are set as events; None does so where the FMU has clocks, which need
+        it. Without, an FMU handles its events inside its steps
     every, sample_period
         of a block: at every so many-th communication point only, as for a Block
     """
@@ -57,6 +61,7 @@ class FMU:
         start: Mapping[str, Any] | None = None,
         substeps: int = 1,
         as_block: bool = False,
+        event_mode: bool | None = None,
         every: int | None = None,
         sample_period: float | None = None,
     ) -> None:
@@ -72,6 +77,7 @@ class FMU:
         self.has_cs = self.description.coSimulation is not None
         self.has_me = self.description.modelExchange is not None
         self._check_interfaces()
+        self.event_mode = self._event_mode(event_mode)
         self._check_platform(self.adapter.platform())
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
         numeric = [v for v in self.variables.values() if v.type in self.adapter.NUMBERS]
@@ -112,6 +118,20 @@ class FMU:
             raise FMUError(
                 f"{self.path.name}: every and sample_period are those of a block; say as_block=True"
             )
+
+    def _event_mode(self, asked: bool | None) -> bool:
+        """Tell whether Co-Simulation uses event mode."""
+        clocks = [v.name for v in self.description.modelVariables if v.type == "Clock"]
+        if not self.has_cs or not (asked or clocks):
+            return False
+        if not self.description.coSimulation.hasEventMode:
+            raise FMUError(
+                f"{self.path.name} has no event mode in Co-Simulation, which "
+                + (f"its clock {clocks[0]} needs" if clocks else "event_mode=True asks for; leave it out")
+            )
+        if clocks and asked is False:
+            raise FMUError(f"{self.path.name}: event_mode=False, but its clock {clocks[0]} needs event mode")
+        return True
 
     def _check_platform(self, platform: str) -> None:
         with zipfile.ZipFile(self.path) as archive:

@@ -19,11 +19,14 @@ from .fmu_instance import Exchange, FMUInstance
 from .instances import Failures
 from .opcodes import CALL, Op
 
-_EVENT_ITERATIONS = 1000  # at one instant; more is a chain of events without end
+EVENT_ITERATIONS = 1000  # at one instant; more is a chain of events without end
 
 
 class EventInstance(FMUInstance):
     """One instance of an FMU whose events are handled here."""
+
+    #: whether there is an event mode, in which alone discrete inputs can be set
+    event_mode: bool = True
 
     def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
         super().__init__(name, fmu, failures, used)
@@ -40,7 +43,7 @@ class EventInstance(FMUInstance):
         """Leave event mode."""
 
     def _set_inputs(self, x: Exchange) -> list[Op]:
-        if not x.discrete:
+        if not (self.event_mode and x.discrete):
             return super()._set_inputs(x)
         if not self.used & x.addresses.keys():
             return []
@@ -67,7 +70,7 @@ class EventInstance(FMUInstance):
         self._resume()
 
     def _discrete_states(self, t: float) -> None:
-        for _ in range(_EVENT_ITERATIONS):
+        for _ in range(EVENT_ITERATIONS):
             again, end, _, _, timed, time = self.fmi.attempt(
                 "update its discrete states", self.fmi.discrete_states
             )
@@ -76,6 +79,4 @@ class EventInstance(FMUInstance):
             if not again:
                 self.event_time[0] = time if timed else np.inf
                 return
-        raise FMUError(
-            f"{self.name}: the event at t = {t:g} s does not end in {_EVENT_ITERATIONS} iterations"
-        )
+        raise FMUError(f"{self.name}: the event at t = {t:g} s does not end in {EVENT_ITERATIONS} iterations")

@@ -1,6 +1,6 @@
 """A running FMU: its buffers, and the operations that call its functions by address.
 
-What all instances share, and Co-Simulation; model_exchange.py adds Model Exchange.
+What all instances share; co_simulation.py and model_exchange.py add how they advance.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Exchange:
 
 
 class FMUInstance:
-    """One instance of an FMU in a run, with Co-Simulation."""
+    """One instance of an FMU in a run."""
 
     is_compiled = True
     model_exchange: ClassVar[bool] = False
@@ -207,18 +207,6 @@ class FMUInstance:
 
     def _from_floats(self, x: Exchange) -> list[Op]:
         return [] if x.raw is x.values else [self._convert(FROM_FLOAT, x, x.values, x.raw)]
-
-    def step(self, fraction: float = 0.0) -> list[Op]:
-        """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
-        stepped = (replace(op, fraction=fraction) for op in self.advance())
-        return [*self.latch(), *stepped, *(replace(op, text="") for op in self.read())]
-
-    def advance(self) -> list[Op]:
-        """Do the step."""
-        function = self._function(f"{self.fmi.PREFIX}DoStep")
-        op = Op(f"{self.name}: step (FMU)", self.fmi.DO_STEP, function, self._component)
-        flags, last = self.fmi.step_answers()
-        return [replace(op, b=flags, c=last, participant=self.name)]
 
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output, the inputs on which it depends directly."""

@@ -300,15 +300,30 @@ def _fmi2_do_step(w: _Writer, op: Op) -> None:
 
 
 def _fmi3_do_step(w: _Writer, op: Op) -> None:
-    event, terminate, early = (w.value(f"getelementptr i8, ptr {w.word(2)}, i64 {i}") for i in range(3))
-    times = (w.time(op.fraction), w.step(op))
+    flags, times = w.word(2), w.word(3)
+    event, terminate, early = (w.value(f"getelementptr i8, ptr {flags}, i64 {i}") for i in range(3))
+    t, h = w.time(op.fraction), w.step(op)
+    end = w.value(f"fadd double {t}, {w.value(f'fmul double {h}, {number(1.0 + 1e-9)}')}")
+    due = w.value(f"fcmp ole double {w.load(w.at(times, 1))}, {end}")
+    split, whole, interrupted, on = (w.label() for _ in range(4))
+    w.lines.append(f"  br i1 {due}, label %{split}, label %{whole}")
+    w.start_block(split)  # as if the step had come back at once
+    w.lines.append(f"  store i8 0, ptr {event}\n  store i8 1, ptr {early}")
+    w.store(t, times)
+    w.lines.append(f"  br label %{interrupted}")
+    w.start_block(whole)
     kinds = "ptr double double i32 ptr ptr ptr ptr"
-    w.check_fmi(w.call(kinds, w.word(1), *times, _MAY_RETURN, event, terminate, early, w.word(3)))
-    status = "0"
-    for flag, code in ((early, opcodes.EARLY_RETURN), (terminate, opcodes.TERMINATED)):
-        is_set = w.value(f"icmp ne i8 {w.value(f'load i8, ptr {flag}')}, 0")
-        status = w.value(f"select i1 {is_set}, i64 {code}, i64 {status}")
-    w.check(status)
+    w.check_fmi(w.call(kinds, w.word(1), t, h, _MAY_RETURN, event, terminate, early, times))
+    ends = w.value(f"icmp ne i8 {w.load(terminate, 'i8')}, 0")
+    w.check(w.value(f"select i1 {ends}, i64 {opcodes.TERMINATED}, i64 0"))
+    either = w.value(f"or i8 {w.load(event, 'i8')}, {w.load(early, 'i8')}")
+    asked = w.value(f"icmp ne i8 {either}, 0")
+    w.lines.append(f"  br i1 {asked}, label %{interrupted}, label %{on}")
+    w.start_block(interrupted)
+    status = w.value(f"call i32 {w.word(4)}(ptr null, double {t}, double {h})")
+    w.check(w.value(f"sext i32 {status} to i64"))
+    w.lines.append(f"  br label %{on}")
+    w.start_block(on)
 
 
 def _fmi_time(w: _Writer, op: Op) -> None:

@@ -16,15 +16,16 @@ GATHER = 7  # n floats, from the first to the second address of n pairs at a
 FMI2_VALUES = 10  # get or set `count` values at c by n references b; with d > 0 they must be finite
 FMI3_VALUES = 11
 FMI2_DO_STEP = 12
-FMI3_DO_STEP = 13  # b: three bools "event, terminate, early return"; c: last successful time
+# b: three bools "event, terminate, early return"; c: last successful time, and when the next event is
+# due; an event that is due before the end of the step, and "event" and "early return" call d
+FMI3_DO_STEP = 13
 FMI_TIME = 14
 FMI_VECTOR = 15  # get or set the vector b of n floats (states, derivatives)
 FMI2_COMPLETED = 16  # b: flags "enter event mode", "terminate"; one set, or time d due, calls c
 FMI3_COMPLETED = 17
 
-#: statuses that the loop adds to those of FMI: fmi3DoStep asked to end, or stopped before t + h
+#: the status that the loop adds to those of FMI: fmi3DoStep asked to end
 TERMINATED = 100
-EARLY_RETURN = 101
 
 
 @dataclass(frozen=True)

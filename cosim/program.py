@@ -20,6 +20,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from .co_simulation import CoSimulationInstance
 from .errors import SimulationError, TimeError, WiringError
 from .fmu import FMU
 from .fmu_instance import FMUInstance
@@ -45,7 +46,7 @@ from .tableaus import TABLEAUS
 from .variables import Array
 
 Table: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
-Instance: TypeAlias = KernelInstance | FMUInstance
+Instance: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInstance
 #: what stage coupling integrates
 Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
 
@@ -133,7 +134,7 @@ class Program:
             )
         model_exchange = (stage and not member.as_block) or not member.has_cs
         self._check_alone(name, member, model_exchange)
-        kind = ModelExchangeInstance if model_exchange else FMUInstance
+        kind = ModelExchangeInstance if model_exchange else CoSimulationInstance
         return kind(name, member, self.failures, used)
 
     def _check_alone(self, name: str, fmu: FMU, model_exchange: bool) -> None:
@@ -217,7 +218,9 @@ class Program:
         ]
 
     def _block(self, name: str, delays: dict[int, Array], fraction: float = 0.0, every: int = 1) -> list[Op]:
-        acting = self.instances[name].step(fraction)
+        instance = self.instances[name]
+        assert not isinstance(instance, ModelExchangeInstance)  # as_block needs Co-Simulation
+        acting = instance.step(fraction)
         return [*self._copies(name, delays, every), *(replace(op, every=every) for op in acting)]
 
     # ----------------------------------------------------------------- recorded signals

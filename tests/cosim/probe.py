@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 import zipfile
 from functools import lru_cache
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import fmpy
 
 SOURCES = Path(__file__).parent / "c"
+FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 INTEGERS = {f"{sign}Int{bits}": 20 + 4 * i + 2 * j
             for i, bits in enumerate((8, 16, 32, 64)) for j, sign in enumerate(("", "U"))}  # fmt: skip
 
@@ -117,35 +119,28 @@ canHandleVariableCommunicationStepSize="true" mightReturnEarlyFromDoStep="true"/
 <EventIndicator valueReference="45"/></ModelStructure></fmiModelDescription>"""
 
 
-@lru_cache(maxsize=2)
-def library(version: str) -> bytes:
-    """Compile the FMU's library."""
-    import tempfile
-
+@lru_cache(maxsize=4)
+def library(*sources: str) -> bytes:
+    """Compile sources of c/ to a library."""
     with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "probe.so"
-        headers = Path(fmpy.__file__).parent / "c-code"
-        source = SOURCES / f"probe{version[0]}.c"
-        command = [
-            sys.executable,
-            "-m",
-            "ziglang",
-            "cc",
-            "-shared",
-            "-fPIC",
-            "-O1",
-            "-w",
-            "-fvisibility=hidden",
-        ]
-        subprocess.run([*command, f"-I{headers}", "-o", str(out), str(source)], check=True)
+        out = Path(folder) / "library.so"
+        compiler = [sys.executable, "-m", "ziglang", "cc"]
+        options = ["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden", f"-I{FMI_HEADERS}", "-o", str(out)]
+        subprocess.run([*compiler, *options, *(str(SOURCES / name) for name in sources)], check=True)
         return out.read_bytes()
+
+
+def write_fmu(path: Path, description: str, name: str, *sources: str) -> Path:
+    """Write an FMU of a model description and sources of c/ to `path`."""
+    folder = fmpy.platform if 'fmiVersion="2.0"' in description else fmpy.platform_tuple
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", description)
+        archive.writestr(f"binaries/{folder}/{name}{fmpy.sharedLibraryExtension}", library(*sources))
+    return path
 
 
 def probe(path: Path, version: str, *, once: bool = False) -> Path:
     """Write the FMU; `once` says that it can be instantiated only once per process."""
-    folder = fmpy.platform if version == "2.0" else fmpy.platform_tuple
-    with zipfile.ZipFile(path, "w") as archive:
-        text = (description2 if version == "2.0" else description3)(once)
-        archive.writestr("modelDescription.xml", text)
-        archive.writestr(f"binaries/{folder}/probe{fmpy.sharedLibraryExtension}", library(version))
-    return path
+    if version == "2.0":
+        return write_fmu(path, description2(once), "probe", "probe2.c")
+    return write_fmu(path, description3(once), "probe", "probe3.c", "rest3.c")

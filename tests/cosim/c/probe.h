@@ -7,7 +7,7 @@
      stair counts time events at 0.75, 1.5, ...                       floor(t / 0.75)
      quarters counts step events, one at every fourth completed step
 
-   The simulation is asked to end at end_at; a step past early_at stops there. In Model Exchange
+   The simulation is asked to end at end_at; a step over early_at stops there. In Model Exchange
    inputs that are not continuous can be set at events only. */
 
 #include <stdbool.h>

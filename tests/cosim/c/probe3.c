@@ -12,26 +12,14 @@ EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 EXPORT void *fmi3InstantiateModelExchange(void) { return probe_new(); }
 EXPORT void *fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, bool visible,
                                          bool logging, bool event_mode, bool early_return) {
-    return event_mode || early_return ? NULL : probe_new(); /* an importer that does not know them */
+    return event_mode ? NULL : probe_new();
 }
-EXPORT void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 EXPORT void fmi3FreeInstance(P) { free(p); }
 
 #define SAME(name) EXPORT fmi3Status name(P) { return fmi3OK; }
 SAME(fmi3Reset) SAME(fmi3Terminate) SAME(fmi3ExitInitializationMode)
 SAME(fmi3SetDebugLogging) SAME(fmi3EnterConfigurationMode)
 SAME(fmi3ExitConfigurationMode) SAME(fmi3EvaluateDiscreteStates)
-
-#define NOT_THERE(name) EXPORT fmi3Status name(P) { return fmi3Error; }
-NOT_THERE(fmi3EnterStepMode) NOT_THERE(fmi3GetString) NOT_THERE(fmi3GetBinary) NOT_THERE(fmi3GetClock)
-NOT_THERE(fmi3SetClock) NOT_THERE(fmi3GetNumberOfVariableDependencies) NOT_THERE(fmi3GetVariableDependencies)
-NOT_THERE(fmi3GetFMUState) NOT_THERE(fmi3SetFMUState) NOT_THERE(fmi3FreeFMUState)
-NOT_THERE(fmi3SerializedFMUStateSize) NOT_THERE(fmi3SerializeFMUState) NOT_THERE(fmi3DeserializeFMUState)
-NOT_THERE(fmi3GetDirectionalDerivative) NOT_THERE(fmi3GetAdjointDerivative) NOT_THERE(fmi3GetIntervalDecimal)
-NOT_THERE(fmi3GetIntervalFraction) NOT_THERE(fmi3GetShiftDecimal) NOT_THERE(fmi3GetShiftFraction)
-NOT_THERE(fmi3SetIntervalDecimal) NOT_THERE(fmi3SetIntervalFraction) NOT_THERE(fmi3SetShiftDecimal)
-NOT_THERE(fmi3SetShiftFraction) NOT_THERE(fmi3GetNominalsOfContinuousStates) NOT_THERE(fmi3GetOutputDerivatives)
-NOT_THERE(fmi3ActivateModelPartition)
 
 EXPORT fmi3Status fmi3EnterInitializationMode(P, bool has_tolerance, double tolerance, double start, bool has_stop,
                                               double stop) {
@@ -102,7 +90,7 @@ EXPORT fmi3Status fmi3DoStep(P, double t, double h, bool no_restore, bool *event
                              double *last) {
     *event = false;
     *terminate = t + h >= p->in[END_AT];
-    *early = t + h > p->in[EARLY_AT];
+    *early = t < p->in[EARLY_AT] && p->in[EARLY_AT] < t + h;
     *last = p->time = *early ? (double)p->in[EARLY_AT] : t + h;
     p->x += p->time - t;
     probe_event(p);
