@@ -76,6 +76,8 @@ class Adapter(ABC):
         self.fmu = fmu
         self.name = name
         self.messages: list[str] = []
+        #: what the call that ended the run returned; 3 is an error, 4 a fatal one
+        self.status = 0
         self.model_exchange = model_exchange
         #: where doStep answers, from FMI 3.0 on
         self.answer: StepAnswer | None = None

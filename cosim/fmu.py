@@ -15,9 +15,10 @@ import shutil
 import weakref
 import zipfile
 from collections.abc import Iterable, Mapping
+from numbers import Real
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -28,6 +29,11 @@ from .fmi3 import Fmi3
 from .fmu_ports import FMUPort, Shape, ports
 from .opcodes import Number
 from .participant import Participant, rate
+from .tableaus import TABLEAUS
+
+Interface = Literal["CoSimulation", "ModelExchange"]
+Solver = Literal["ode1", "ode2", "ode3", "ode4", "cvode"]
+SOLVERS = (*TABLEAUS, "cvode")
 
 _ADAPTERS: dict[str, type[Adapter]] = {"2": Fmi2, "3": Fmi3}
 
@@ -40,9 +46,21 @@ class FMU:
     start
         values of parameters, inputs or start values by variable name; structural parameters
         (FMI 3.0) change the shapes of the arrays that they size
+    interface
+        "CoSimulation" or "ModelExchange", where the FMU has both; None is Co-Simulation if
+        it is there, and Model Exchange under stage coupling
+    solver
+        of Model Exchange under sampled coupling. "ode1" to "ode4": fixed steps in the
+        compiled loop; a step is split at a time event, state events are handled at its end.
+        "cvode": variable steps and order from event to event, for stiff plants; state
+        events are located; its steps run as a Python callback. Either way the inputs are
+        held over the communication step, and an event is no communication point. None is
+        ode4, and cvode for an FMU with event indicators
     substeps
-        steps of the solver (ode4) in one communication step, for an FMU that has Model
-        Exchange only, under sampled coupling
+        steps of a fixed-step solver in one communication step
+    tolerance
+        relative tolerance of cvode, 1e-6 unless given; the absolute one of a state is that
+        times its nominal value
     as_block
         acts as a Block does, at communication points in the order of the connections: set
         inputs, doStep from t_k, get outputs at t_k; what a Block that was exported needs
@@ -59,7 +77,10 @@ class FMU:
         path: str | PathLike[str],
         *,
         start: Mapping[str, Any] | None = None,
+        interface: Interface | None = None,
+        solver: Solver | None = None,
         substeps: int = 1,
+        tolerance: float | None = None,
         as_block: bool = False,
         event_mode: bool | None = None,
         every: int | None = None,
@@ -69,7 +90,10 @@ class FMU:
         #: the participant that was exported to this file, where that is known
         self.source: Participant | None = None
         self.start = dict(start or {})
+        self.interface = interface
+        self.solver = solver
         self.substeps = substeps
+        self.tolerance = 1e-6 if tolerance is None else tolerance
         self.as_block = as_block
         self.every, self.sample_period = rate(self.path.name, every, sample_period)
         self.description = read_description(self.path)
@@ -77,6 +101,7 @@ class FMU:
         self.has_cs = self.description.coSimulation is not None
         self.has_me = self.description.modelExchange is not None
         self._check_interfaces()
+        self._check_solver(tolerance is not None)
         self.event_mode = self._event_mode(event_mode)
         self._check_platform(self.adapter.platform())
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
@@ -99,8 +124,6 @@ class FMU:
                     f"{self.path.name} has no variable '{name}'" + did_you_mean(name, self.variables)
                 )
         self.start_values()
-        if not isinstance(substeps, int) or substeps < 1:
-            raise FMUError(f"{self.path.name}: substeps={substeps!r} is no whole number, 1 or more")
         self.directory = _extracted(self.path)
         weakref.finalize(self, shutil.rmtree, str(self.directory), ignore_errors=True)
 
@@ -110,10 +133,20 @@ class FMU:
                 f"{self.path} has neither Co-Simulation nor Model Exchange, and Scheduled Execution is "
                 "not supported; export it with one of them"
             )
-        if self.as_block and not self.has_cs:
+        has = {"CoSimulation": self.has_cs, "ModelExchange": self.has_me}
+        if self.interface is not None and self.interface not in has:
             raise FMUError(
-                f"{self.path.name}: as_block=True needs Co-Simulation, and it has Model Exchange only"
+                f"{self.path.name}: interface '{self.interface}' is not known"
+                + did_you_mean(self.interface, has)
             )
+        if self.interface is not None and not has[self.interface]:
+            other = next(name for name, there in has.items() if there)
+            raise FMUError(
+                f'{self.path.name}: interface="{self.interface}" is not there, the FMU has {other} only'
+            )
+        if self.as_block and (not self.has_cs or self.interface == "ModelExchange"):
+            why = "it has Model Exchange only" if not self.has_cs else 'interface="ModelExchange" is given'
+            raise FMUError(f"{self.path.name}: as_block=True needs Co-Simulation, and {why}")
         if not self.as_block and (self.every, self.sample_period) != (None, None):
             raise FMUError(
                 f"{self.path.name}: every and sample_period are those of a block; say as_block=True"
@@ -122,7 +155,7 @@ class FMU:
     def _event_mode(self, asked: bool | None) -> bool:
         """Tell whether Co-Simulation uses event mode."""
         clocks = [v.name for v in self.description.modelVariables if v.type == "Clock"]
-        if not self.has_cs or not (asked or clocks):
+        if self.model_exchange or not (asked or clocks):
             return False
         if not self.description.coSimulation.hasEventMode:
             raise FMUError(
@@ -132,6 +165,38 @@ class FMU:
         if clocks and asked is False:
             raise FMUError(f"{self.path.name}: event_mode=False, but its clock {clocks[0]} needs event mode")
         return True
+
+    @property
+    def model_exchange(self) -> bool:
+        """Tell whether sampled coupling uses Model Exchange."""
+        return self.interface == "ModelExchange" or not self.has_cs
+
+    def _check_solver(self, has_tolerance: bool) -> None:
+        name, solver = self.path.name, self.solver
+        if solver is not None and solver not in SOLVERS:
+            raise FMUError(f"{name}: solver '{solver}' is not known" + did_you_mean(solver, SOLVERS))
+        if not isinstance(self.substeps, int) or self.substeps < 1:
+            raise FMUError(f"{name}: substeps={self.substeps!r} is no whole number, 1 or more")
+        if not isinstance(self.tolerance, Real) or not 1e-14 <= self.tolerance < 1.0:
+            raise FMUError(f"{name}: tolerance={self.tolerance!r} is no number from 1e-14 to 1, such as 1e-6")
+        given = [n for n, is_given in (("solver", solver is not None), ("substeps", self.substeps != 1),
+                                       ("tolerance", has_tolerance)) if is_given]  # fmt: skip
+        if given and not self.model_exchange:
+            remedy = 'say interface="ModelExchange" as well' if self.has_me else "leave it away"
+            raise FMUError(
+                f"{name}: {given[0]} is of Model Exchange, and Co-Simulation, which has a solver of its "
+                f"own, is used; {remedy}"
+            )
+        indicators = bool(self.description.numberOfEventIndicators)
+        cvode = solver == "cvode" or (solver is None and indicators)
+        if cvode and self.substeps != 1:
+            why = "" if solver else ", which an FMU with event indicators has unless solver= is given"
+            raise FMUError(f"{name}: substeps are of solvers with fixed steps, not of cvode{why}")
+        if has_tolerance and not cvode:
+            raise FMUError(
+                f'{name}: tolerance is of solver="cvode", and {solver or "ode4"} has fixed steps; '
+                "make substeps= larger instead"
+            )
 
     def _check_platform(self, platform: str) -> None:
         with zipfile.ZipFile(self.path) as archive:

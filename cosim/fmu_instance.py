@@ -51,8 +51,6 @@ class FMUInstance:
         self.fmu = fmu
         self.failures = failures
         self.running = False
-        #: what the call that ended the run returned; 3 is an error, 4 a fatal one
-        self.status = 0
         self.used = used
         #: states of the FMU that were got and not freed
         self.kept: list[Any] = []
@@ -95,9 +93,9 @@ class FMUInstance:
 
     def stop(self) -> None:
         """Terminate and free the instance; after a fatal error it must not be called any more."""
-        if self.status == 4:
+        if self.fmi.status == 4:
             return
-        if self.running and self.status < 3:
+        if self.running and self.fmi.status < 3:
             try:
                 self.api.terminate()
             except Exception as error:  # the run is over; an FMU that cannot terminate is reported, not fatal
@@ -153,7 +151,7 @@ class FMUInstance:
 
     def failure(self, op: Op, status: int, t: float, h: float) -> str:
         """Return what it means that an operation ended with a status, and remember it for the end."""
-        self.status = status if status < TERMINATED else 0
+        self.fmi.status = status if status < TERMINATED else 0
         return self.fmi.failure(status, op.code == self.fmi.DO_STEP, t, h * op.every)
 
     # ---------------------------------------------------------------------- operations

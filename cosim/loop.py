@@ -23,7 +23,7 @@ from collections.abc import Callable
 
 from . import conversions, opcodes
 from .conversions import number
-from .opcodes import Op
+from .opcodes import SLACK, Op
 
 _MAY_RETURN = "0"  # noSetFMUStatePriorToCurrentPoint: a simulation may return to a snapshot
 INLINE = 8  # up to so many floats an operation is written out, above it is a loop
@@ -86,6 +86,8 @@ class _Writer:
         self.block = "act"
         self.failures: list[tuple[str, int, str]] = []
         self.library: dict[str, str] = {}
+        #: where what stands between UNLESS_EVENT and END goes on
+        self.ends: list[str] = []
 
     def value(self, expression: str) -> str:
         """Write `%n = expression` and return %n."""
@@ -340,7 +342,7 @@ def _fmi_completed(w: _Writer, op: Op) -> None:
     second = w.value(f"getelementptr {boolean}, ptr {flags}, i64 1")
     w.check_fmi(w.call("ptr i32 ptr ptr", w.word(1), _MAY_RETURN, flags, second))
     t = w.time(op.fraction)
-    almost = w.value(f"fadd double {t}, {w.value(f'fmul double %h, {number(1e-9)}')}")
+    almost = w.value(f"fadd double {t}, {w.value(f'fmul double %h, {number(SLACK)}')}")
     due = w.value(f"fcmp oge double {almost}, {w.value(f'load double, ptr {w.word(4)}')}")
     either = w.value(
         f"or {boolean} {w.value(f'load {boolean}, ptr {flags}')}, {w.value(f'load {boolean}, ptr {second}')}"
@@ -351,6 +353,25 @@ def _fmi_completed(w: _Writer, op: Op) -> None:
     w.start_block(handle)
     status = w.value(f"call i32 {w.word(3)}(ptr null, double {t}, double %h)")
     w.check(w.value(f"sext i32 {status} to i64"))
+    w.lines.append(f"  br label %{on}")
+    w.start_block(on)
+
+
+def _unless_event(w: _Writer, op: Op) -> None:
+    end = w.value(f"fsub double {w.time(1.0)}, {w.value(f'fmul double %h, {number(SLACK)}')}")
+    due = w.value(f"fcmp olt double {w.value(f'load double, ptr {w.word(4)}')}, {end}")
+    inside, split, on = w.label(), w.label(), w.label()
+    w.lines.append(f"  br i1 {due}, label %{split}, label %{inside}")
+    w.start_block(split)
+    status = w.value(f"call i32 {w.word(3)}(ptr null, double {w.time(0.0)}, double %h)")
+    w.check(w.value(f"sext i32 {status} to i64"))
+    w.lines.append(f"  br label %{on}")
+    w.start_block(inside)
+    w.ends.append(on)
+
+
+def _end(w: _Writer, op: Op) -> None:
+    on = w.ends.pop()
     w.lines.append(f"  br label %{on}")
     w.start_block(on)
 
@@ -372,6 +393,8 @@ _WRITE: dict[int, Callable[[_Writer, Op], None]] = {
     opcodes.FMI_VECTOR: _fmi_vector,
     opcodes.FMI2_COMPLETED: _fmi_completed,
     opcodes.FMI3_COMPLETED: _fmi_completed,
+    opcodes.UNLESS_EVENT: _unless_event,
+    opcodes.END: _end,
 }
 
 

@@ -1,24 +1,35 @@
 """A running FMU with Model Exchange: integrated here, its events handled.
 
-Under sampled coupling it is integrated over each communication step by ode4 in equal
-substeps, its inputs held; under stage coupling by the method of all.
+Under sampled coupling it is integrated over each communication step with its inputs held:
+by CVODE, from event to event (event_steps.py), or by a fixed-step method in equal
+substeps. That one runs in the compiled loop; a step in which a time event is due is
+split there, and a state event is handled at the end of the step. Under stage coupling it
+is integrated by the method of all, with one step for all: events are handled at its end.
 """
 
 from __future__ import annotations
 
 import ctypes
 import math
+import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
+from .continuous_time import ContinuousTime
 from .errors import FMUError, SimulationError
+from .event_steps import EventSteps, RungeKutta
 from .fmu import FMU
 from .fmu_events import EventInstance
 from .instances import Failures, buffer
-from .opcodes import CALL, COMBINE, COPY, FMI_TIME, FMI_VECTOR, Op
+from .opcodes import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
 from .tableaus import TABLEAUS
+
+
+class LateEventWarning(UserWarning):
+    """A time event was handled at the end of the step that runs over it."""
 
 
 class ModelExchangeInstance(EventInstance):
@@ -36,9 +47,15 @@ class ModelExchangeInstance(EventInstance):
         self.states = buffer(self.n_states)
         self.state_address = int(self.states.ctypes.data)
         self.flags = np.zeros(2, dtype=self.fmi.FLAG)
-        self._signs = buffer(self.n_indicators) > 0
+        self.signs = buffer(self.n_indicators) > 0.0
         self.stages = buffer(5 * self.n_states)
         self.event_callback: Any = None
+        self.callbacks: list[Any] = []
+        self.model = ContinuousTime(self.fmi, self.n_states, self.n_indicators)
+        #: what integrates it under sampled coupling
+        self.solver = fmu.solver or ("cvode" if self.n_indicators else "ode4")
+        self.steps: EventSteps | None = None
+        self.is_late = False
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and the events of the start."""
@@ -48,16 +65,38 @@ class ModelExchangeInstance(EventInstance):
 
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
-        return [*super().arrays(), self.states, self.flags, self._signs]
+        return [*super().arrays(), self.states, self.flags, self.signs]
 
     # ---------------------------------------------------------------------- operations
 
+    def _callback(self, function: Callable[[float, float], None]) -> int:
+        self.callbacks.append(self.failures.guard(self.name, function))
+        return ctypes.cast(self.callbacks[-1], ctypes.c_void_p).value or 0
+
     def advance(self) -> list[Op]:
-        """Integrate over the step, by Runge-Kutta over the model's derivatives with its input held."""
-        nodes, rows, weights = TABLEAUS["ode4"]
+        """Integrate over the step, with the inputs held."""
+        if self.solver == "cvode":
+            text = f"{self.name}: cvode, tolerance {self.fmu.tolerance:g}, from event to event"
+            return [
+                Op(
+                    f"{text} (FMU, Python callback)",
+                    CALL,
+                    self._callback(self._carry_by_cvode),
+                    participant=self.name,
+                )
+            ]
+        split = self._callback(self._carry_by_fixed_steps)
+        event_time = int(self.event_time.ctypes.data)
+        text = f"{self.name}: {self.solver}, {self.fmu.substeps} substeps, split at time events (FMU)"
+        unless = Op(text, UNLESS_EVENT, c=split, d=event_time, participant=self.name)
+        return [unless, *self._fixed_steps(), Op("", END, participant=self.name)]
+
+    def _fixed_steps(self) -> list[Op]:
+        """Integrate by Runge-Kutta over the model's derivatives."""
+        nodes, rows, weights = TABLEAUS[self.solver]
         part = 1.0 / self.fmu.substeps
         base = self.stages.ctypes.data
-        ops = [Op(f"{self.name}: ode4, {self.fmu.substeps} substeps (FMU)", COPY, participant=self.name)]
+        ops: list[Op] = []
         for j in range(self.fmu.substeps):
             ops.append(Op("", COPY, a=self.state_address, b=base, n=self.n_states, weights=(1.0, 0.0)))
             for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
@@ -110,36 +149,81 @@ class ModelExchangeInstance(EventInstance):
             self.event_callback = self.failures.guard(self.name, self._handle_events)
         return ctypes.cast(self.event_callback, ctypes.c_void_p).value or 0
 
+    # ------------------------------------------------------------------ steps in Python
+
+    def _carry_by_cvode(self, t: float, h: float) -> None:
+        if self.steps is None:
+            from .cvode import Cvode
+
+            self.steps = self._event_steps(Cvode(self.model, t, self.fmu.tolerance))
+        self.model.set_time(t)
+        signs = self._indicator_signs()
+        if (signs != self.signs).any():  # the inputs that are new at t have led to an event
+            self._event(t)
+        self.steps.carry(t, h)
+        self.model.get_states(self.state_address)
+        self.signs[:] = self._indicator_signs()
+
+    def _carry_by_fixed_steps(self, t: float, h: float) -> None:
+        if self.steps is None:
+            self.steps = self._event_steps(RungeKutta(self.model, self.solver, self.fmu.substeps))
+        self.model.set_time(t)
+        self.steps.carry(t, h)
+        self.model.get_states(self.state_address)
+
+    def _event_steps(self, mover: Any) -> EventSteps:
+        return EventSteps(
+            self.model,
+            mover,
+            completed=self._completed,
+            event=self._event,
+            next_event=self.event_time,
+            interrupted=lambda: self.failures.interrupted,
+        )
+
+    def _completed(self, t: float) -> bool:
+        """Tell the model of a completed step; return whether that asks for an event."""
+        event, end = self.fmi.attempt("complete a step", self.api.completedIntegratorStep)
+        if end:
+            raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s")
+        if event or self.solver == "cvode":  # which finds state events itself
+            return bool(event)
+        return bool((self._indicator_signs() != self.signs).any())
+
     # -------------------------------------------------------------------------- events
 
     def _indicator_signs(self) -> Any:
-        n = self.n_indicators
-        z = buffer(n)
-        if n:
-            pointer = z.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-            self.fmi.attempt("get its event indicators", lambda: self.api.getEventIndicators(pointer, n))
-        return z > 0
+        z = buffer(self.n_indicators)
+        self.model.get_indicators(z.ctypes.data)
+        return z > 0.0
 
     def _handle_events(self, t: float, h: float) -> None:
+        """Handle what happened in a step of the compiled loop, which ends at t."""
         if self.flags[1]:
             raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s")
         signs = self._indicator_signs()
-        state_event = bool((signs != self._signs).any())
-        time_event = t + 1e-9 * h >= self.event_time[0]
-        if state_event or time_event or self.flags[0]:
+        due = float(self.event_time[0])
+        timed = due <= t + SLACK * h
+        if timed and due > t:
+            self.model.set_time(due)
+        elif due < t - SLACK * h and not self.is_late:
+            self.is_late = True
+            warnings.warn(
+                f"{self.name} has a time event at t = {due:g} s, inside the step to t = {t:g} s, and is told "
+                "at its end: stage coupling has one step for all participants; choose one that "
+                "meets the event, or sampled coupling",
+                LateEventWarning,
+                stacklevel=2,
+            )
+        if timed or self.flags[0] or (signs != self.signs).any():
             self._event(t)
         else:
-            self._signs[:] = signs
+            self.signs[:] = signs
 
     def _resume(self) -> None:
         self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
-        self._get_states()
-        self._signs[:] = self._indicator_signs()
-
-    def _get_states(self) -> None:
-        if self.n_states:
-            pointer = self.states.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-            self.fmi.attempt("get its states", lambda: self.api.getContinuousStates(pointer, self.n_states))
+        self.model.get_states(self.state_address)
+        self.signs[:] = self._indicator_signs()
 
     def locate(self, address: int) -> str:
         """Return the name of the variable or state at an address, for an error message."""

@@ -23,6 +23,11 @@ FMI_TIME = 14
 FMI_VECTOR = 15  # get or set the vector b of n floats (states, derivatives)
 FMI2_COMPLETED = 16  # b: flags "enter event mode", "terminate"; one set, or time d due, calls c
 FMI3_COMPLETED = 17
+UNLESS_EVENT = 18  # go on; but if a time event at d is due before t + h, call c and go on at END
+END = 19
+
+#: a time event within so many steps after a communication point is due there: room for the round-off of times
+SLACK = 1e-9
 
 #: the status that the loop adds to those of FMI: fmi3DoStep asked to end
 TERMINATED = 100

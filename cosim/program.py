@@ -127,15 +127,31 @@ class Program:
                 "steps at communication points only; give it sample_period= or every=1, "
                 'or use coupling="sampled"'
             )
-        if stage and not member.as_block and not member.has_me:
-            raise WiringError(
-                f"{name} ({member.path.name}) has no Model Exchange, which stage coupling needs; "
-                'use coupling="sampled" or export it with Model Exchange'
-            )
-        model_exchange = (stage and not member.as_block) or not member.has_cs
+        if stage and not member.as_block:
+            self._check_stage(name, member)
+        model_exchange = (stage and not member.as_block) or member.model_exchange
         self._check_alone(name, member, model_exchange)
         kind = ModelExchangeInstance if model_exchange else CoSimulationInstance
         return kind(name, member, self.failures, used)
+
+    def _check_stage(self, name: str, fmu: FMU) -> None:
+        where = f"{name} ({fmu.path.name})"
+        if not fmu.has_me:
+            raise WiringError(
+                f"{where} has no Model Exchange, which stage coupling needs; "
+                'use coupling="sampled" or export it with Model Exchange'
+            )
+        if fmu.interface == "CoSimulation":
+            raise WiringError(
+                f'{where} is to be used with interface="CoSimulation", and stage coupling needs Model '
+                'Exchange; leave interface away, or use coupling="sampled"'
+            )
+        if fmu.solver is not None or fmu.substeps != 1:
+            raise WiringError(
+                f"{where} has a solver of its own, and stage coupling integrates all participants "
+                "together, by simulate(solver=); leave solver and substeps of the FMU away, "
+                'or use coupling="sampled"'
+            )
 
     def _check_alone(self, name: str, fmu: FMU, model_exchange: bool) -> None:
         description = fmu.description
