@@ -89,6 +89,8 @@ class FMU:
         self.path = Path(path)
         #: the participant that was exported to this file, where that is known
         self.source: Participant | None = None
+        #: what has to live as long as the file does, such as the folder that holds it
+        self.kept: object = None
         self.start = dict(start or {})
         self.interface = interface
         self.solver = solver
@@ -222,7 +224,7 @@ class FMU:
         joined = self._ports(self.variables.values())
         found: dict[str, list[Any]] = {}
         for name, value in self.start.items():
-            port = joined[name] if name in joined else self._ports([self.variables[name]])[name]
+            port = joined.get(name) or next(iter(self._ports([self.variables[name]]).values()))
             kind = port.variables[0].type
             number = self.adapter.NUMBERS[kind][1] if kind in self.adapter.NUMBERS else None
             try:

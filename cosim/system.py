@@ -12,6 +12,7 @@ can be checked without time is checked here.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -58,9 +59,11 @@ class Connection:
 
     def __str__(self) -> str:
         delayed = "" if self.initial is None else " (one step late)"
-        factor = (
-            "" if (self.scale, self.offset) == (1.0, 0.0) else f" [{self.source.unit} -> {self.target.unit}]"
-        )
+        factor = ""
+        if (self.scale, self.offset) != (1.0, 0.0):
+            units = self.source.unit, self.target.unit
+            same = None in units or units[0] == units[1]
+            factor = f" [* {self.scale:g} + {self.offset:g}]" if same else f" [{units[0]} -> {units[1]}]"
         return f"{self.target} <- {self.source}{factor}{delayed}"
 
 
@@ -114,13 +117,22 @@ class System:
             raise WiringError(f"'{name}' is the same object as another participant; make a second one")
         self.participants[name] = member
 
-    def connect(self, source: str, target: str, *, initial: Array | float | None = None) -> None:
+    def connect(
+        self,
+        source: str,
+        target: str,
+        *,
+        initial: Array | float | None = None,
+        transformation: tuple[float, float] | None = None,
+    ) -> None:
         """Connect an output or state to an input.
 
         The same unit is passed through, a compatible one converted, any other refused. A
         scalar output may feed every element of an array input. `initial` delays the
         connection by one communication step and is the source's value, in its unit,
-        before the first point: the way to break a cycle of blocks.
+        before the first point: the way to break a cycle of blocks. `transformation`
+        (factor, offset), target = factor * source + offset, takes the place of the units'
+        conversion.
         """
         out = self.port(source, "output")
         into = self.port(target, "input")
@@ -138,9 +150,11 @@ class System:
             if same and overlap:
                 raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
         try:
-            scale, offset = conversion(out.unit, into.unit)
+            scale, offset = transformation or conversion(out.unit, into.unit)
         except WiringError as error:
             raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
+        if not (math.isfinite(scale) and math.isfinite(offset)):
+            raise WiringError(f"{out} -> {into}: transformation {transformation} is not finite")
         self.connections.append(Connection(out, into, scale, offset, _initial(out, initial)))
         try:
             self.block_order()

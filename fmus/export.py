@@ -71,12 +71,12 @@ def export(
         trial = Path(folder) / f"{name}.fmu"
         here = find_platform(host())
         libraries = {p: link(model, p) for p in {here: None} | dict.fromkeys(wanted)}
-        _write(trial, files | _binaries(name, {here: libraries[here]}, fmi_version))
+        write_archive(trial, files | _binaries(name, {here: libraries[here]}, fmi_version))
         files |= reference_files(trial, participant, plan, offered)
     files |= _binaries(name, {p: libraries[p] for p in wanted}, fmi_version)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        _write(target, files)
+        write_archive(target, files)
     except OSError as error:
         raise ExportError(f"{target} cannot be written: {error.strerror}") from error
     return target
@@ -119,12 +119,12 @@ def _default_experiment(participant: Participant) -> DefaultExperiment:
 # ------------------------------------------------------------------------ archive
 
 
-def _write(path: Path, files: Mapping[str, bytes]) -> None:
+def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDescription.xml") -> None:
     """Write a zip archive whose bytes depend on its contents only; whoever looks sees all of it."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name in ["modelDescription.xml", *sorted(files.keys() - {"modelDescription.xml"})]:
+            for name in [first, *sorted(files.keys() - {first})]:
                 entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 entry.create_system = 3

@@ -1,0 +1,300 @@
+"""A system from an SSP (System Structure and Parameterization, 1.0 and 2.0).
+
+    system = read_ssp("loop.ssp")
+    system = read_ssp("loop.ssp", replace={"control": MyController()})
+
+Components are FMUs with the start values that the package binds to them; nested systems are
+flattened, `plant.damper` becomes the participant `plant_damper`; signal dictionaries,
+connectors of systems, units and linear transformations are resolved to plain connections.
+What is not supported is an error that names the element: mapping transformations, other
+packages as components, clocks. fmus/ssp.py writes SSPs, ssp_format.py says what an SSP of
+ours tells beyond the standard.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import shutil
+import tempfile
+import weakref
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+
+from .errors import CosimError, WiringError, did_you_mean
+from .fmu import FMU, read_description
+from .fmu_ports import unit_of
+from .ssp_format import (
+    FMU_TYPE,
+    NAMESPACES,
+    ROOT,
+    SSD,
+    VERSIONS,
+    SSPError,
+    Units,
+    element_name,
+    numbers,
+    own_annotation,
+    parse_xml,
+    tag,
+)
+from .ssp_parameters import Parameters, Value
+from .ssp_structure import Element, Link, Structure
+from .system import Member, System, inputs_of, outputs_of
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How a package says that it is run; None where it does not say, times in s."""
+
+    start: float | None = None
+    stop: float | None = None
+    step: float | None = None
+    coupling: str | None = None
+    solver: str | None = None
+
+
+@dataclass(frozen=True)
+class Package:
+    """What an SSP holds: the system, and its default experiment."""
+
+    system: System
+    experiment: Experiment
+
+
+def read_ssp(path: str | PathLike[str], *, replace: Mapping[str, Member] | None = None) -> System:
+    """Return the system of an SSP; `replace` puts participants in the place of components, by name.
+
+    A participant in the place of a component has ports with the names of its connectors; the
+    values that the package binds to that component are not for it.
+    """
+    return read_package(path, replace=replace).system
+
+
+def read_package(path: str | PathLike[str], *, replace: Mapping[str, Member] | None = None) -> Package:
+    """Return the system and the default experiment of an SSP."""
+    package = Path(path)
+    if not package.is_file():
+        raise SSPError(f"there is no file {package}; give the path of an .ssp file")
+    if not zipfile.is_zipfile(package):
+        raise SSPError(f"{package} is no SSP: it is not a ZIP archive; was it copied completely?")
+    with zipfile.ZipFile(package) as archive:
+        return _Reader(package, archive, dict(replace or {})).package()
+
+
+class _Folder:
+    """A temporary folder that lives as long as the FMUs from it."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="structcosim-ssp-"))
+        weakref.finalize(self, shutil.rmtree, str(self.path), ignore_errors=True)
+
+
+class _Reader:
+    """Reads one package."""
+
+    def __init__(self, path: Path, archive: zipfile.ZipFile, replace: dict[str, Member]) -> None:
+        self.where = path.name
+        self.archive = archive
+        self.files = {entry.filename: entry for entry in archive.infolist()}
+        self.replace = replace
+        self.folder = _Folder()
+        self.copies: dict[str, Path] = {}
+        if ROOT not in self.files:
+            raise SSPError(f"{path} is no SSP: it has no {ROOT} at its top")
+        self.root = parse_xml(self.read(ROOT, self.where), f"{self.where}/{ROOT}")
+        version = self.root.get("version", "none")
+        if self.root.tag != tag(SSD, "SystemStructureDescription") or version not in VERSIONS:
+            raise SSPError(f"{self.where} has SSP version {version}; 1.0 and 2.0 are supported")
+        self.structure = Structure(self.root, self.where)
+        self.units = Units.of(self.root, SSD, self.where)
+        self.parameters = Parameters(self.structure.root, self.read, self.where)
+
+    def read(self, source: str, where: str) -> bytes:
+        """Return a file of the package by the URI that names it."""
+        uri = urlsplit(source)
+        name = posixpath.normpath(unquote(uri.path))
+        if uri.scheme or uri.netloc or uri.fragment or name.startswith(("/", "..")):
+            raise SSPError(f"{where}: '{source}' is outside of the package, which is not supported")
+        if name not in self.files:
+            raise SSPError(f"{where}: the package has no file '{name}'" + did_you_mean(name, self.files))
+        try:
+            return self.archive.read(self.files[name])
+        except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
+            raise SSPError(f"{where}: '{name}' cannot be read from the package: {error}") from error
+
+    def package(self) -> Package:
+        """Build the system."""
+        system = System()
+        links = list(self.structure.links())
+        names: dict[str, Element] = {}
+        for path, element in self.structure.components.items():
+            name = element_name(path)
+            if name in names:
+                other = ".".join(names[name].path)
+                raise SSPError(
+                    f"{self.where}: {other} and {'.'.join(path)} would both be '{name}'; rename one"
+                )
+            names[name] = element
+        for name in self.replace:
+            if name not in names:
+                raise WiringError(f"{self.where} has no component '{name}'" + did_you_mean(name, names))
+        for name, element in names.items():
+            system.add(name, self.replace[name] if name in self.replace else self._fmu(element, links))
+        for link in links:
+            if link.origin.path in self.structure.components and not self._sets_parameter(link):
+                self._connect(system, link)
+        return Package(system, self._experiment())
+
+    def _sets_parameter(self, link: Link) -> bool:
+        kind = self.structure.components[link.target.path].kinds[link.target.name]
+        if kind in ("parameter", "structuralParameter"):
+            raise SSPError(
+                f"{self.where}: {link.origin} -> {link.target} connects a parameter to another component, "
+                "which is not supported; bind a value to it"
+            )
+        return False
+
+    # ---------------------------------------------------------------------- components
+
+    def _fmu(self, element: Element, links: list[Link]) -> FMU:
+        where = f"{self.where}: component {'.'.join(element.path)}"
+        source = element.xml.get("source")
+        if not source:
+            raise SSPError(f"{where} has no FMU (no source); give a participant in its place, replace=")
+        kind = element.xml.get("type", FMU_TYPE)
+        if kind != FMU_TYPE:
+            raise SSPError(f"{where} is of type {kind}, which is not supported; FMUs ({FMU_TYPE}) are")
+        if source not in self.copies:
+            data = self.read(source, where)
+            name = element_name((posixpath.basename(unquote(source)).removesuffix(".fmu"),))
+            place = self.folder.path / str(len(self.copies)) / f"{name}.fmu"
+            place.parent.mkdir()
+            place.write_bytes(data)
+            self.copies[source] = place
+        path = self.copies[source]
+        own = own_annotation(element.xml, SSD, "participant")
+        try:
+            fmu = FMU(
+                path,
+                start=self._start_values(element, read_description(path), links),
+                substeps=_whole(own.get("substeps", "1"), where),
+                as_block=own.get("kind") == "block",
+                every=_whole(own["every"], where) if "every" in own else None,
+                sample_period=numbers(own["samplePeriod"], where)[0] if "samplePeriod" in own else None,
+            )
+        except CosimError as error:
+            raise type(error)(f"{where}: {error}") from error
+        self._choose_interface(fmu, element.xml.get("implementation", "any"), where)
+        fmu.kept = self.folder
+        return fmu
+
+    def _choose_interface(self, fmu: FMU, wanted: str, where: str) -> None:
+        has = {"any": True, "CoSimulation": fmu.has_cs, "ModelExchange": fmu.has_me}
+        if not has.get(wanted, False):
+            raise SSPError(f"{where} is to run as {wanted}; {fmu} cannot")
+        fmu.has_cs &= wanted != "ModelExchange"
+        fmu.has_me &= wanted != "CoSimulation"
+
+    def _start_values(self, element: Element, description: Any, links: list[Link]) -> dict[str, Any]:
+        self.units.add_fmu(description)
+        variables = {v.name: v for v in description.modelVariables}
+        found = self.parameters.of(element)
+        start = {n: self._start(value, variables[n]) for n, value in found.items() if n in variables}
+        for link in links:
+            if link.target.path == element.path and link.target.name in variables:
+                value = self.parameters.values.get(link.origin)
+                if value is not None and link.origin.path not in self.structure.components:
+                    start[link.target.text] = self._along(link, value, variables[link.target.name])
+        return start
+
+    def _start(self, value: Value, variable: Any) -> Any:
+        if value.kind != "Enumeration":
+            return value.in_unit(unit_of(variable), self.units)
+        items = {i.name: int(i.value) for i in getattr(variable.declaredType, "items", None) or []}
+        names = value.value if isinstance(value.value, list) else [value.value]
+        for name in names:
+            if name not in items:
+                raise SSPError(f"'{name}' is no item of {variable.name}" + did_you_mean(name, items))
+        return [items[n] for n in names] if isinstance(value.value, list) else items[value.value]
+
+    def _along(self, link: Link, value: Value, variable: Any) -> Any:
+        """Return the value of a system's connector as what arrives at a component's."""
+        first = self.structure.units.get(link.origin) or value.unit
+        scale, offset = self._transformation(link, first, unit_of(variable))
+        plain = value.in_unit(first, self.units)
+        return plain if (scale, offset) == (1.0, 0.0) else scale * plain + offset
+
+    # --------------------------------------------------------------------- connections
+
+    def _connect(self, system: System, link: Link) -> None:
+        origin, target = link.origin, link.target
+        a, b = (f"{element_name(node.path)}.{node.text}" for node in (origin, target))
+        text = " -> ".join(map(str, [origin, *(edge.target for edge in link.edges)]))
+        initial = link.edges[0].initial
+        if len(link.edges) > 1 and any(edge.initial is not None for edge in link.edges):
+            raise SSPError(
+                f"{self.where}: {text} is one step late inside of a system, which is not supported"
+            )
+        try:
+            source, sink = system.port(a, "output"), system.port(b, "input")
+            transformation = self._transformation(link, source.unit, sink.unit)
+            late = None if initial is None else np.array(initial)
+            system.connect(a, b, initial=late, transformation=transformation)
+        except WiringError as error:
+            ends = [element_name(n.path) for n in (origin, target) if element_name(n.path) in self.replace]
+            for name in ends:
+                member = self.replace[name]
+                ports = ", ".join([*inputs_of(member), *outputs_of(member)])
+                text += f" ({name} is replaced by a {type(member).__name__}, ports: {ports})"
+            raise WiringError(f"{self.where}: {text}: {error}") from error
+
+    def _transformation(self, link: Link, first: str | None, last: str | None) -> tuple[float, float]:
+        """Return (factor, offset) from a port's unit over all connectors to another port's unit."""
+        scale, offset, unit = 1.0, 0.0, first
+
+        def apply(factor: float, shift: float) -> None:
+            nonlocal scale, offset
+            if (factor, shift) != (1.0, 0.0):
+                scale, offset = factor * scale, factor * offset + shift
+
+        def to(other: str | None) -> None:
+            nonlocal unit
+            apply(*self.units.convert(unit, other))
+            unit = other or unit
+
+        to(self.structure.units.get(link.origin.whole))
+        for edge in link.edges:
+            other = self.structure.units.get(edge.target.whole)
+            if edge is link.edges[-1]:
+                other = other or last  # a linear transformation comes after the conversion
+            if edge.keep_unit:
+                unit = other
+            else:
+                to(other)
+            apply(edge.factor, edge.offset)
+        to(last)
+        return scale, offset
+
+    def _experiment(self) -> Experiment:
+        found = self.root.find(f"{SSD}:DefaultExperiment", NAMESPACES)
+        if found is None:
+            return Experiment()
+        own = own_annotation(found, SSD, "experiment")
+        where = f"{self.where}: default experiment"
+        texts = {"start": found.get("startTime"), "stop": found.get("stopTime"), "step": own.get("step")}
+        times = {name: numbers(text, where)[0] for name, text in texts.items() if text}
+        return Experiment(**times, coupling=own.get("coupling"), solver=own.get("solver"))
+
+
+def _whole(text: str, where: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise SSPError(f"{where}: '{text}' is no whole number") from None
