@@ -127,7 +127,7 @@ class FMUInstance:
             self.kept.append(state)
         return [array.copy() for array in self.arrays()], kept
 
-    def restore(self, saved: tuple[list[Any], Any]) -> None:
+    def restore(self, saved: Any) -> None:
         """Return to what `save` returned, which stays as it is."""
         arrays, kept = saved
         state = kept
@@ -140,7 +140,7 @@ class FMUInstance:
         for array, values in zip(self.arrays(), arrays, strict=True):
             array[:] = values
 
-    def forget(self, saved: tuple[list[Any], Any]) -> None:
+    def forget(self, saved: Any) -> None:
         """Free a state that was kept."""
         self.kept.remove(saved[1])
         self.fmi.attempt("free its state", lambda: self.api.freeFMUState(saved[1]))

@@ -144,17 +144,20 @@ class KernelInstance:
     #: Python can be copied, and so can the record
     can_save = can_serialise = True
 
-    def save(self) -> tuple[Array, dict[str, Any]]:
+    def save(self, serialised: bool = True) -> tuple[Array, dict[str, Any]]:
         """Return a copy of the record, and of what a block in Python keeps beside it."""
         attributes = {} if self.is_compiled else self.participant.own_attributes()
         return self.participant.memory.copy(), attributes
 
-    def restore(self, saved: tuple[Array, dict[str, Any]]) -> None:
+    def restore(self, saved: Any) -> None:
         """Take back what `save` returned, which stays as it is."""
         memory, attributes = saved
         self.participant.memory[:] = memory
         if not self.is_compiled:
             self.participant.take_attributes(attributes)
+
+    def forget(self, saved: Any) -> None:
+        """Nothing to free."""
 
     def address(self, port: str) -> int:
         """Return the address of a variable."""

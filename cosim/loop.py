@@ -19,11 +19,16 @@ returned, or -1 - i when value i is not finite.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 
+import numpy as np
+
 from . import conversions, opcodes
+from .compiler import load
 from .conversions import number
 from .opcodes import SLACK, Op
+from .variables import Array
 
 _MAY_RETURN = "0"  # noSetFMUStatePriorToCurrentPoint: a simulation may return to a snapshot
 INLINE = 8  # up to so many floats an operation is written out, above it is a loop
@@ -396,6 +401,33 @@ _WRITE: dict[int, Callable[[_Writer, Op], None]] = {
     opcodes.UNLESS_EVENT: _unless_event,
     opcodes.END: _end,
 }
+
+
+class Loop:
+    """The operations of a system, ready to run.
+
+    report
+        row and k where it stopped, status there, recorded rows, sampled points
+    """
+
+    def __init__(self, first: list[Op], second: list[Op]) -> None:
+        self.rows = [*first, *second]
+        self.report = np.zeros(5, dtype=np.int64)
+        self._table = np.array([op.operands() for op in self.rows], dtype=np.int64)
+        integer, real, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+        kinds = (pointer, integer, integer, integer, real, real, pointer, integer)
+        self._function = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(loop_ir(first, second))("run"))
+
+    def record_to(self, data: Array) -> None:
+        """Set where recorded rows go."""
+        for row, op in enumerate(self.rows):
+            if op.code == opcodes.RECORD:
+                self._table[row, 2] = data.ctypes.data
+
+    def run(self, k: int, until: int, last: int, t0: float, h: float, resume: bool = False) -> bool:
+        """Run the points k to until - 1; tell whether an operation failed."""
+        table, report = self._table.ctypes.data, self.report.ctypes.data
+        return bool(self._function(table, k, until, last, t0, h, report, resume))
 
 
 def loop_ir(first: list[Op], second: list[Op]) -> str:

@@ -25,6 +25,7 @@ def simulate(
     statistics: Iterable[str] | None = None,
     decimation: int = 1,
     jit: bool = True,
+    tolerance: float = 1e-8,
     progress: Callable[[int, int], None] | None = None,
 ) -> Result:
     """Run a system from `start` to `stop` with the communication step `step`, in s.
@@ -33,6 +34,8 @@ def simulate(
         "sampled": what a real controller does; inputs are held over a step.
         "continuous": stage coupling, everything with continuous state is integrated
         together by `solver` (ode1 to ode4), blocks run at every stage
+        "iterated": as sampled, but FMUs and Continuous participants that are connected
+        directly agree at every communication point, by repeating steps (iterated.py)
     record
         ports to record, such as "plant.x"; None records every output and state
     statistics
@@ -41,6 +44,8 @@ def simulate(
         record every so many-th communication point
     jit
         False calls every kernel as Python: for a debugger
+    tolerance
+        of iterated coupling, relative to the size of each value exchanged
     progress
         called with (steps done, steps in all) some ten times a second
 
@@ -60,6 +65,7 @@ def simulate(
         statistics=statistics,
         decimation=decimation,
         jit=jit,
+        tolerance=tolerance,
     ) as simulation:
         return simulation.run(stop, progress)
 
@@ -67,7 +73,7 @@ def simulate(
 def schedule(system: System, *, step: float, coupling: Coupling = "sampled", solver: Solver = "ode3") -> str:
     """Return what happens in one communication step, a line an operation."""
     check_time(step, 0.0)
-    check_choices(coupling, solver, 1)
+    check_choices(coupling, solver, 1, 1e-8)
     program = Program(system, float(step), coupling, solver, [], [], 1, True)
     program.close()
     return program.schedule()

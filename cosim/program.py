@@ -25,7 +25,8 @@ from .errors import SimulationError, TimeError, WiringError
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
-from .loop import loop_ir
+from .iterated import IteratedCoupling
+from .loop import Loop
 from .model_exchange import ModelExchangeInstance
 from .opcodes import (
     CALL,
@@ -80,6 +81,7 @@ class Program:
         statistics: list[Port],
         decimation: int,
         jit: bool,
+        tolerance: float = 1e-8,
     ) -> None:
         self.system = system
         self.h = h
@@ -87,12 +89,13 @@ class Program:
         self.instances: dict[str, Instance] = {}
         self._alone: dict[str, str] = {}  # FMUs that can be there once only, by token
         self.buffers: list[Array] = []
+        self.iteration: IteratedCoupling | None = None
         self.first: list[Op] = []
         self.second: list[Op] = []
         self.recorded = record
         self.watched = statistics
-        self.coupling = coupling if coupling == "sampled" else f"stage coupling, {solver}"
-        stage = coupling != "sampled"
+        self.coupling = f"stage coupling, {solver}" if coupling == "continuous" else f"{coupling} coupling"
+        stage = coupling == "continuous"
         ends = [end for c in system.connections for end in (c.source, c.target)]
         used = {(p.participant, p.name) for p in [*record, *statistics, *ends]}
         try:
@@ -106,7 +109,8 @@ class Program:
             if stage:
                 self._stage_coupling(solver, self.delays, decimation)
             else:
-                self._sampled_coupling(self.delays, decimation)
+                self._sampled_coupling(self.delays, decimation, tolerance if coupling == "iterated" else None)
+            self.memory = [*self.delays.values(), *(self.iteration.arrays() if self.iteration else [])]
         except BaseException:
             self.close()
             raise
@@ -183,7 +187,8 @@ class Program:
 
     # --------------------------------------------------------------------- connections
 
-    def _address(self, port: Port) -> int:
+    def address(self, port: Port) -> int:
+        """Return the address of the floats of a port."""
         return self.instances[port.participant].address(port.name) + 8 * port.first
 
     def _delays(self) -> dict[int, Array]:
@@ -198,17 +203,19 @@ class Program:
                 self.buffers.append(delays[i])
         return delays
 
-    def _copies(self, name: str, delays: dict[int, Array], every: int = 1) -> list[Op]:
-        """Return the operations that bring the inputs of a participant."""
+    def _copies(
+        self, name: str, delays: dict[int, Array], every: int = 1, leave: list[Connection] | None = None
+    ) -> list[Op]:
+        """Return the operations that bring the inputs of a participant, some connections left out."""
         ops = []
         for i, c in enumerate(self.system.connections):
-            if c.target.participant == name:
-                source = delays[i].ctypes.data if i in delays else self._address(c.source)
+            if c.target.participant == name and c not in (leave or []):
+                source = delays[i].ctypes.data if i in delays else self.address(c.source)
                 ops += self._copy(c, source, every)
         return ops
 
     def _copy(self, c: Connection, source: int, every: int) -> list[Op]:
-        target = self._address(c.target)
+        target = self.address(c.target)
         weights = (c.scale, c.offset)
         op = Op(str(c), COPY, a=source, b=target, n=c.source.count, every=every, weights=weights)
         if c.source.count == c.target.count:
@@ -223,7 +230,7 @@ class Program:
             source = self.system.connections[i].source
             text = f"keep {source} for the next step"
             kept = memory[1].ctypes.data
-            ops.append(Op(text, COPY, a=self._address(source), b=kept, n=source.count, weights=(1.0, 0.0)))
+            ops.append(Op(text, COPY, a=self.address(source), b=kept, n=source.count, weights=(1.0, 0.0)))
         return ops
 
     def _release(self, delays: dict[int, Array]) -> list[Op]:
@@ -243,7 +250,7 @@ class Program:
 
     def _addresses(self, ports: list[Port]) -> Table:
         """Return the addresses of the single floats of ports."""
-        return np.array([self._address(p) + 8 * i for p in ports for i in range(p.count)], dtype=np.int64)
+        return np.array([self.address(p) + 8 * i for p in ports for i in range(p.count)], dtype=np.int64)
 
     def values(self, addresses: Table) -> Array:
         """Return the floats at addresses."""
@@ -267,8 +274,14 @@ class Program:
 
     # ----------------------------------------------------------------- sampled coupling
 
-    def _sampled_coupling(self, delays: dict[int, Array], decimation: int) -> None:
+    def _sampled_coupling(self, delays: dict[int, Array], decimation: int, tolerance: float | None) -> None:
+        """Sampled coupling; with a tolerance, what moves and is coupled directly is iterated."""
         moving = [n for n in self.instances if not self._is_block(n)]
+        coupled: list[Connection] = []
+        if tolerance is not None:
+            coupled = self._coupled(moving)
+            self.iteration = IteratedCoupling(self, coupled, tolerance)
+        alone = [n for n in moving if self.iteration is None or n not in self.iteration.members]
         for name in moving:
             if self.instances[name].has_outputs:
                 self.first += self.instances[name].read()
@@ -277,10 +290,26 @@ class Program:
         self.first += self._sinks(decimation)
         self.first += self._remember(delays)
         for name in moving:
-            self.second += [*self._copies(name, delays), *self.instances[name].latch()]
-        for name in moving:
+            self.second += self._copies(name, delays, leave=coupled)
+            self.second += self.instances[name].latch() if name in alone else []
+        for name in alone:
             self.second += self.instances[name].advance()
+        self.second += [self.iteration.operation()] if self.iteration else []
         self.second += self._release(delays)
+
+    def _coupled(self, moving: list[str]) -> list[Connection]:
+        """Return the connections that iterated coupling solves for."""
+        found = [
+            c
+            for c in self.system.connections
+            if c.source.participant in moving and c.target.participant in moving and c.initial is None
+        ]
+        if not found:
+            raise WiringError(
+                "nothing is there to iterate: no FMU or Continuous is connected to another one; "
+                'use coupling="sampled"'
+            )
+        return found
 
     # ------------------------------------------------------------------- stage coupling
 
@@ -368,18 +397,18 @@ class Program:
 
     # ------------------------------------------------------------------------- the loop
 
-    def loop(self) -> tuple[str, Table]:
-        """Return the loop as LLVM IR and the table of its operands; `rows` are the operations in it."""
-        first, second = self._merged(self.first), self._merged(self.second)
-        self.rows = [*first, *second]
-        table = np.array([op.operands() for op in self.rows], dtype=np.int64)
-        return loop_ir(first, second), table
+    def start(self, t0: float) -> None:
+        """Initialize the participants."""
+        for instance in self.instances.values():
+            instance.start(t0)
+            if self.failures.exception is not None:
+                raise self._exception()
+        if self.iteration is not None:
+            self.iteration.start(t0)
 
-    def record_to(self, table: Table, data: Array) -> None:
-        """Set where the loop puts recorded rows."""
-        for row, op in enumerate(self.rows):
-            if op.code == RECORD:
-                table[row, 2] = data.ctypes.data
+    def loop(self) -> Loop:
+        """Return the loop, compiled."""
+        return Loop(self._merged(self.first), self._merged(self.second))
 
     def _merged(self, ops: list[Op]) -> list[Op]:
         """Join neighbouring copies of a few floats to one operation: less to look up for the loop."""
@@ -396,18 +425,10 @@ class Program:
 
     # ------------------------------------------------------------------------- failures
 
-    def error(self, row: int, start: float, k: int, status: int) -> SimulationError:
-        """Return what it means that the operation in a row failed at point k with a status."""
-        failures = self.failures
-        if failures.exception is not None:
-            where, t = failures.participant, failures.time
-            what = f"{type(failures.exception).__name__}: {failures.exception}"
-            asked = isinstance(failures.exception, SimulationError)  # an FMU's: place and time are in it
-            text = str(failures.exception) if asked else f"{where} failed at t = {t:g} s: {what}"
-            error = SimulationError(text)
-            error.__cause__ = failures.exception
-            return error
-        op = self.rows[row]
+    def error(self, op: Op, start: float, k: int, status: int) -> SimulationError:
+        """Return what it means that an operation failed at point k with a status."""
+        if self.failures.exception is not None:
+            return self._exception()
         t = op.seconds(start, k, self.h)
         instance = self.instances[op.participant]
         values = {FMI2_VALUES: op.c, FMI3_VALUES: op.c, FROM_FLOAT: op.a, TO_FLOAT: op.b}
@@ -431,6 +452,15 @@ class Program:
             text += "\n  log of the FMU:" + "".join(f"\n  {line}" for line in log)
         return SimulationError(text)
 
+    def _exception(self) -> SimulationError:
+        """Return the exception of a callback as an error of the run."""
+        exception, where, t = self.failures.exception, self.failures.participant, self.failures.time
+        what = f"{type(exception).__name__}: {exception}"
+        asked = isinstance(exception, SimulationError)  # an FMU's: place and time are in it
+        error = SimulationError(str(exception) if asked else f"{where} failed at t = {t:g} s: {what}")
+        error.__cause__ = exception
+        return error
+
     # ------------------------------------------------------------------------- as text
 
     def schedule(self) -> str:
@@ -440,8 +470,7 @@ class Program:
             rated = ((op, f" (every {op.every})" if op.every > 1 else "") for op in ops if op.text)
             return [f"  {op.text}{rate}" for op, rate in rated]
 
-        title = "sampled coupling" if self.coupling == "sampled" else self.coupling
-        return "\n".join([title, "at t_k:", *lines(self.first), "to t_k+1:", *lines(self.second)])
+        return "\n".join([self.coupling, "at t_k:", *lines(self.first), "to t_k+1:", *lines(self.second)])
 
 
 def _copied_as_is(op: Op) -> int:

@@ -14,7 +14,6 @@ communication point is in program.py, and `Result.schedule` shows it for the run
 
 from __future__ import annotations
 
-import ctypes
 import math
 import shutil
 import signal
@@ -26,26 +25,25 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Integral, Real
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
-from .compiler import load
 from .errors import RecordError, SimulationError, SnapshotError, TimeError, WiringError, did_you_mean
 from .fmu import FMU
 from .instances import Failures
-from .program import Program, Table, steps_between
+from .loop import Loop
+from .program import Program, steps_between
 from .result import Result, Statistics
 from .system import Port, System, inputs_of, outputs_of
 from .tableaus import TABLEAUS
 from .variables import Array
 
-Coupling = Literal["sampled", "continuous"]
+Coupling = Literal["sampled", "iterated", "continuous"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4"]
 
 #: recorded signals above this many bytes go to a temporary file
 MEMORY_LIMIT = 200_000_000
-_REPORT = 5
 
 
 class Interrupted(KeyboardInterrupt):
@@ -72,7 +70,7 @@ class Snapshot:
     #: k, and whether the outputs at k have been evaluated
     place: tuple[int, bool]
     parts: dict[str, Any]
-    delays: list[Array]
+    memory: list[Array]
     owner: object
 
 
@@ -95,9 +93,10 @@ class Simulation:
         statistics: Iterable[str] | None = None,
         decimation: int = 1,
         jit: bool = True,
+        tolerance: float = 1e-8,
     ) -> None:
         check_time(step, start)
-        check_choices(coupling, solver, decimation)
+        check_choices(coupling, solver, decimation, tolerance)
         self.system = system
         self.step, self.start, self.decimation = float(step), float(start), int(decimation)
         self._options: dict[str, Any] = {
@@ -106,13 +105,14 @@ class Simulation:
             "record": None if record is None else _names(record),
             "statistics": None if statistics is None else _names(statistics),
             "jit": jit,
+            "tolerance": tolerance,
         }
         recorded = _ports(system, self._options["record"])
         watched = recorded if statistics is None else _ports(system, self._options["statistics"])
-        self._program = Program(system, self.step, coupling, solver, recorded, watched, self.decimation, jit)
-        self._report = np.zeros(_REPORT, dtype=np.int64)
-        self._loop: Callable[..., int] | None = None
-        self._table: Table = np.zeros((0, 5), dtype=np.int64)
+        self._program = Program(
+            system, self.step, coupling, solver, recorded, watched, self.decimation, jit, tolerance
+        )
+        self._loop: Loop | None = None
         #: the point that comes next, or, once its outputs have been evaluated, the present one
         self._k, self._acted = 0, False
         self._incomplete = self._closed = False
@@ -154,38 +154,41 @@ class Simulation:
             raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
         with _ctrl_c(self._program.failures):
             self._check_usable("run")
-            self._open_records(last)
-            return self._run(self._begun(), last, progress)
+            loop = self._begun()
+            self._open_records(loop, last)
+            return self._run(loop, last, progress)
 
-    def _begun(self) -> Callable[..., int]:
+    def _begun(self) -> Loop:
         """Return the loop; the first time, compile it and initialize the participants."""
         if self._loop is None:
-            ir, self._table = self._program.loop()
-            self._loop = _compiled(ir)
             self._incomplete = True
             self._began = time.perf_counter()
-            for instance in self._program.instances.values():
-                instance.start(self.start)
-                if self._program.failures.exception is not None:
-                    raise self._error(0, 0, 0)
+            self._loop = self._program.loop()
+            self._data = np.empty((0, self._program.columns))
+            try:
+                self._program.start(self.start)
+            except SimulationError as error:
+                error.result = self._result(interrupted=True)
+                raise
             self._incomplete = False
         return self._loop
 
-    def _open_records(self, last: int) -> None:
+    def _open_records(self, loop: Loop, last: int) -> None:
         """Make room for what is recorded from here on; the present point is the first if it was computed."""
         program = self._program
         self._data = self._room(last)
         self._first = self._k
-        self._report[:] = 0
+        loop.record_to(self._data)
+        loop.report[:] = 0
         program.statistics[:] = np.inf, -np.inf, 0.0, 0.0
         if self._acted:
             x = program.values(program.watched_addresses)
             if len(x):
                 program.statistics[:] = np.column_stack([x, x, x, x * x])
-            self._report[4] = 1
+            loop.report[4] = 1
             if self._k % self.decimation == 0:
                 self._data[0] = program.values(program.recorded_addresses)
-                self._report[3] = 1
+                loop.report[3] = 1
 
     def _room(self, last: int) -> Array:
         rows = last // self.decimation - -(-self._k // self.decimation) + 1
@@ -203,28 +206,24 @@ class Simulation:
         file = tempfile.TemporaryFile(prefix="structcosim-")  # noqa: SIM115  lives as long as the arrays
         return np.memmap(file, dtype=np.float64, mode="w+", shape=(rows, columns))
 
-    def _run(
-        self, loop: Callable[..., int], last: int, progress: Callable[[int, int], None] | None
-    ) -> Result:
-        program = self._program
-        program.record_to(self._table, self._data)
+    def _run(self, loop: Loop, last: int, progress: Callable[[int, int], None] | None) -> Result:
+        failures = self._program.failures
         self._began = time.perf_counter()
         begin, chunk = self._k, 1  # grows: a slow callback must not hold up progress and Ctrl-C
-        table, report = self._table.ctypes.data, self._report.ctypes.data
         self._incomplete = True  # until the loop is back
         try:
             while self._k < last or not self._acted:
                 until = min(self._k + chunk, last + 1)
                 before = time.perf_counter()
-                failed = loop(table, self._k, until, last, self.start, self.step, report, int(self._acted))
-                if failed:
-                    self._k, self._acted = int(self._report[1]), False
-                    if isinstance(program.failures.exception, KeyboardInterrupt):
-                        raise program.failures.exception
-                    raise self._error(*(int(x) for x in self._report[:3]))
+                if loop.run(self._k, until, last, self.start, self.step, self._acted):
+                    row, self._k, status = (int(x) for x in loop.report[:3])
+                    self._acted = False
+                    if isinstance(failures.exception, KeyboardInterrupt):
+                        raise failures.exception
+                    raise self._program.error(loop.rows[row], self.start, self._k, status)
                 self._acted = until > last
                 self._k = min(until, last)
-                if program.failures.interrupted:
+                if failures.interrupted:
                     self._incomplete = False
                     raise KeyboardInterrupt
                 took = time.perf_counter() - before
@@ -232,8 +231,11 @@ class Simulation:
                 if progress is not None:
                     progress(self._k - begin, last - begin)
         except KeyboardInterrupt:
-            program.failures.clear()
+            failures.clear()
             raise Interrupted(self._result(interrupted=True)) from None
+        except SimulationError as error:
+            error.result = self._result(interrupted=True)
+            raise
         self._incomplete = False
         return self._result()
 
@@ -254,8 +256,8 @@ class Simulation:
             )
         parts = {name: instance.save() for name, instance in self._program.instances.items()}
         portable = all(instance.can_serialise for instance in self._program.instances.values())
-        delays = [memory.copy() for memory in self._program.delays.values()]
-        return Snapshot(self.time, portable, (self._k, self._acted), parts, delays, self._token)
+        memory = [array.copy() for array in self._program.memory]
+        return Snapshot(self.time, portable, (self._k, self._acted), parts, memory, self._token)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot; what was recorded since then stays in the results that were returned."""
@@ -268,8 +270,8 @@ class Simulation:
         self._begun()
         for name, instance in self._program.instances.items():
             instance.restore(snapshot.parts[name])
-        for memory, kept in zip(self._program.delays.values(), snapshot.delays, strict=True):
-            memory[:] = kept
+        for array, kept in zip(self._program.memory, snapshot.memory, strict=True):
+            array[:] = kept
         self._k, self._acted = snapshot.place
         self._incomplete = False
         self._program.failures.clear()
@@ -314,7 +316,8 @@ class Simulation:
 
     def _result(self, interrupted: bool = False) -> Result:
         program = self._program
-        rows = int(self._report[3])
+        assert self._loop is not None
+        rows, sampled = (int(n) for n in self._loop.report[3:])
         signals: dict[str, Array] = {}
         column = 0
         for port in program.recorded:
@@ -327,7 +330,7 @@ class Simulation:
             time=self.start + k * self.step,
             signals=signals,
             units={str(p): p.unit for p in [*program.recorded, *program.watched]},
-            statistics=self._statistics(),
+            statistics=self._statistics(sampled),
             step=self.step,
             steps=self._k - self._first,
             seconds=time.perf_counter() - self._began,
@@ -335,8 +338,7 @@ class Simulation:
             interrupted=interrupted,
         )
 
-    def _statistics(self) -> dict[str, Statistics]:
-        n = int(self._report[4])
+    def _statistics(self, n: int) -> dict[str, Statistics]:
         found: dict[str, Statistics] = {}
         if n == 0:
             return found
@@ -349,11 +351,6 @@ class Simulation:
                 values = [float(v[0]) for v in values]
             found[str(port)] = Statistics(*values)
         return found
-
-    def _error(self, row: int, k: int, status: int) -> SimulationError:
-        error = self._program.error(row, self.start, k, status)
-        error.result = self._result(interrupted=True)
-        return error
 
 
 # --------------------------------------------------------------------------------- checks
@@ -371,16 +368,16 @@ def check_time(step: float, start: float, stop: float | None = None) -> None:
         raise TimeError(f"stop={stop:g} s is not after start={start:g} s")
 
 
-def check_choices(coupling: str, solver: str, decimation: int) -> None:
-    """Refuse a coupling, a solver or a decimation that is not known."""
-    if coupling not in ("sampled", "continuous"):
-        raise TimeError(
-            f"coupling '{coupling}' is not known" + did_you_mean(coupling, ["sampled", "continuous"])
-        )
+def check_choices(coupling: str, solver: str, decimation: int, tolerance: float) -> None:
+    """Refuse a coupling, a solver, a decimation or a tolerance that is none."""
+    if coupling not in get_args(Coupling):
+        raise TimeError(f"coupling '{coupling}' is not known" + did_you_mean(coupling, get_args(Coupling)))
     if solver not in TABLEAUS:
         raise TimeError(f"solver '{solver}' is not known" + did_you_mean(solver, TABLEAUS))
     if not isinstance(decimation, Integral) or decimation < 1:
         raise TimeError(f"decimation={decimation!r} is no whole number of steps, 1 or more")
+    if not (isinstance(tolerance, Real) and 0.0 < float(tolerance) < 1.0):
+        raise TimeError(f"tolerance={tolerance!r} is no relative tolerance; it lies between 0 and 1")
 
 
 def _names(names: Iterable[str]) -> list[str]:
@@ -408,14 +405,6 @@ def _readable(system: System, name: str) -> Port:
 
 
 # ----------------------------------------------------------------------------------- loop
-
-
-def _compiled(ir: str) -> Callable[..., int]:
-    """Return the loop of a system as a function."""
-    integer, real, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
-    kinds = (pointer, integer, integer, integer, real, real, pointer, integer)
-    function: Callable[..., int] = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(ir)("run"))
-    return function
 
 
 @contextmanager

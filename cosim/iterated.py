@@ -1,0 +1,158 @@
+"""Iterated coupling: FMUs and Continuous participants that drive each other, without delay.
+
+Under sampled coupling each of two coupled plants holds what the other one gave at t_k, an
+error of first order in h that can destabilise. Here the values w that they exchange are
+solved for at t_{k+1}: each step is taken with their mean held,
+
+    hold (w_k + w_{k+1}) / 2 over [t_k, t_{k+1}],  w_{k+1} = outputs at t_{k+1} with w_{k+1} as inputs,
+
+undone and repeated until w_{k+1} agrees with itself (quasi_newton.py). So the interface
+conditions hold at every communication point, direct feedthrough in a ring included, and
+the coupling is of second order. What blocks give is held over the step, as always.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import SimulationError, WiringError
+from .loop import Loop
+from .opcodes import CALL, Op
+from .quasi_newton import NoConvergence, QuasiNewton
+from .system import Connection
+from .variables import Array
+
+if TYPE_CHECKING:
+    from .program import Program
+
+
+class IteratedCoupling:
+    """The participants that drive each other, and the solver of what they exchange."""
+
+    def __init__(self, program: Program, connections: list[Connection], tolerance: float) -> None:
+        self._program = program
+        ends = [end.participant for c in connections for end in (c.source, c.target)]
+        #: the participants, in the order of the system
+        self.members = [name for name in program.instances if name in ends]
+        self._instances = {name: program.instances[name] for name in self.members}
+        unable = [name for name, instance in self._instances.items() if not instance.can_save]
+        if unable:
+            raise WiringError(
+                f"{', '.join(unable)} cannot get and set its state (canGetAndSetFMUState), which iterated "
+                'coupling needs to repeat a step; use coupling="sampled", or export it with that capability'
+            )
+        self._sources = list(dict.fromkeys(c.source for c in connections))
+        self._views = [_floats(program.address(p), p.count) for p in self._sources]
+        n = 0
+        where = {}
+        for port in self._sources:
+            where[port] = slice(n, n + port.count)
+            n += port.count
+        self._inputs = [
+            (_floats(program.address(c.target), c.target.count), where[c.source], c.scale, c.offset)
+            for c in connections
+        ]
+        self._solver = QuasiNewton(n, tolerance)
+        #: what is exchanged at t_k and at t_{k-1}
+        self._w, self._before = np.full((2, n), np.nan)
+        self._t0 = 0.0
+        self._loops: tuple[Loop, Loop] | None = None
+        self._callback = program.failures.guard(self.members[0], self._step)
+
+    def operation(self) -> Op:
+        """Return the operation that moves the members from t_k to t_{k+1}."""
+        address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
+        text = (
+            f"{', '.join(self.members)}: step, repeated until {', '.join(map(str, self._sources))} "
+            f"agree at t_k+1 to {self._solver.tolerance:g} (Python callback)"
+        )
+        return Op(text, CALL, address, participant=self.members[0])
+
+    def arrays(self) -> list[Array]:
+        """Return the memory that belongs to the state of a simulation."""
+        return [self._w, self._before, *self._solver.arrays()]
+
+    @property
+    def repetitions(self) -> int:
+        """How often a step was taken in all, repetitions included."""
+        return int(self._solver.evaluations[0])
+
+    def start(self, t0: float) -> None:
+        """Let the outputs at t_0 agree with the inputs that they are."""
+        self._t0 = t0
+        every = list(self._instances.values())
+        latch = [op for i in every for op in i.latch()]
+        look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [])
+        after = [op for i in every for op in i.read(1.0)]
+        move = Loop([*latch, *(op for i in every for op in i.advance())], [])
+        self._loops = move, Loop([*latch, *after], [])
+
+        def g(w: Array) -> Array:
+            self._hold(w)
+            self._run(look, 0)
+            return self._outputs()
+
+        self._run(look, 0)
+        solver = QuasiNewton(len(self._w), self._solver.tolerance)
+        self._w[:] = self._before[:] = self._solved(solver, g, self._outputs(), t0)
+
+    def _step(self, t: float, h: float) -> None:
+        """Take the step from t; the outputs are left as they are at t + h."""
+        assert self._loops is not None
+        move, look = self._loops
+        k = round((t - self._t0) / h)
+        saved = {name: instance.save(serialised=False) for name, instance in self._instances.items()}
+        moved = False
+
+        def g(w: Array) -> Array:
+            nonlocal moved
+            if moved:
+                for name, instance in self._instances.items():
+                    instance.restore(saved[name])
+            moved = True
+            self._hold(0.5 * (self._w + w))
+            self._run(move, k)
+            self._hold(w)
+            self._run(look, k)
+            return self._outputs()
+
+        w = self._solved(self._solver, g, 2.0 * self._w - self._before, t + h)
+        self._before[:], self._w[:] = self._w, w
+        for name, instance in self._instances.items():
+            instance.forget(saved[name])
+
+    def _solved(self, solver: QuasiNewton, g: Callable[[Array], Array], guess: Array, t: float) -> Array:
+        try:
+            return solver.solve(g, guess)
+        except NoConvergence as error:
+            worst = int(np.argmax(error.residual))
+            name = [f"{p.participant}.{p.name}" for p in self._sources for _ in range(p.count)][worst]
+            raise SimulationError(
+                f"the coupling of {', '.join(self.members)} did not converge at t = {t:g} s: {name} is off "
+                f"by {error.residual[worst]:.3g} of its size, tolerance {solver.tolerance:g}; "
+                "take a smaller step=, or a larger tolerance="
+            ) from None
+
+    def _hold(self, w: Array) -> None:
+        for view, part, scale, offset in self._inputs:
+            view[:] = scale * w[part] + offset
+
+    def _outputs(self) -> Array:
+        return np.concatenate(self._views)
+
+    def _run(self, loop: Loop, k: int) -> None:
+        """Run operations once, at t_k."""
+        program = self._program
+        if loop.run(k, k + 1, k, self._t0, program.h):
+            row, _, status = (int(x) for x in loop.report[:3])
+            raise program.error(loop.rows[row], self._t0, k, status)
+
+
+def _floats(address: int, n: int) -> Array:
+    """Return n floats at an address as an array."""
+    array: Array = np.ctypeslib.as_array((ctypes.c_double * n).from_address(address))
+    return array
