@@ -40,7 +40,6 @@ from controllers.switching import HysteresisControl, SaturationControl
 from cosim import Block, Result, System, simulate
 from cosim.blocks import RecordSource, SensorDynamics, WeightedSum, WhiteNoise, function_source
 from cosim.records import G, el_centro
-from cosim.simulation import Coupling
 from fmus.cached import as_fmu
 from fmus.oscillator import Oscillator
 
@@ -58,6 +57,8 @@ Gain = Literal[
     "hysteresis",
 ]
 GAINS: tuple[Gain, ...] = get_args(Gain)
+#: nothing to iterate here: no plant drives another one
+Coupling = Literal["sampled", "continuous"]
 Plant = Literal["fmu", "python"]
 GroundUnit = Literal["g", "m/s^2"]
 STEP, STOP = 0.01, 40.0
