@@ -17,6 +17,7 @@ import numpy as np
 from .errors import FMUError
 from .fmu_ports import Shape
 from .opcodes import TERMINATED, Number
+from .shared_library import check_library, library_name
 from .variables import Array
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ class Adapter(ABC):
         self.answer: StepAnswer | None = None
         description = fmu.description
         self.interface = description.modelExchange if model_exchange else description.coSimulation
+        check_library(fmu.directory / library_name(self.platform(), self.interface.modelIdentifier))
         try:
             # FMPy goes to the library's folder and stays there when it does not load
             with chdir(fmu.directory):

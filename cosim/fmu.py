@@ -10,10 +10,6 @@ FMI is in fmi2.py and fmi3.py.
 from __future__ import annotations
 
 import math
-import re
-import shutil
-import weakref
-import zipfile
 from collections.abc import Iterable, Mapping
 from numbers import Real
 from os import PathLike
@@ -22,13 +18,16 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .archive import Archive
 from .errors import FMUError, did_you_mean
 from .fmi import Adapter
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .fmu_ports import FMUPort, Shape, ports
+from .model_description import read_description
 from .opcodes import Number
 from .participant import Participant, rate
+from .shared_library import library_name
 from .tableaus import TABLEAUS
 
 Interface = Literal["CoSimulation", "ModelExchange"]
@@ -98,14 +97,17 @@ class FMU:
         self.tolerance = 1e-6 if tolerance is None else tolerance
         self.as_block = as_block
         self.every, self.sample_period = rate(self.path.name, every, sample_period)
-        self.description = read_description(self.path)
-        self.adapter = _ADAPTERS[self.description.fmiVersion.partition(".")[0]]
-        self.has_cs = self.description.coSimulation is not None
-        self.has_me = self.description.modelExchange is not None
-        self._check_interfaces()
-        self._check_solver(tolerance is not None)
+        with Archive(self.path) as archive:
+            self.description = read_description(archive)
+            self.adapter = _ADAPTERS[self.description.fmiVersion.partition(".")[0]]
+            self.has_cs = self.description.coSimulation is not None
+            self.has_me = self.description.modelExchange is not None
+            self._check_interfaces()
+            self._check_solver(tolerance is not None)
+            self._check_platform(archive)
+            self._extraction = archive.extraction()  # shared, and kept for as long as this object is
+        self.directory = self._extraction.folder
         self.event_mode = self._event_mode(event_mode)
-        self._check_platform(self.adapter.platform())
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
         numeric = [v for v in self.variables.values() if v.type in self.adapter.NUMBERS]
         self.output_ports = self._ports(v for v in numeric if v.causality in ("output", "local"))
@@ -120,14 +122,13 @@ class FMU:
         self.declared_outputs = [
             n for n, p in self.output_ports.items() if p.variables[0].causality == "output"
         ]
+        known = self.variables.keys() | self._ports(self.variables.values()) if self.start else set()
         for name in self.start:
-            if name not in self.variables and name not in self._ports(self.variables.values()):
+            if name not in known:
                 raise FMUError(
                     f"{self.path.name} has no variable '{name}'" + did_you_mean(name, self.variables)
                 )
         self.start_values()
-        self.directory = _extracted(self.path)
-        weakref.finalize(self, shutil.rmtree, str(self.directory), ignore_errors=True)
 
     def _check_interfaces(self) -> None:
         if not (self.has_cs or self.has_me):
@@ -200,15 +201,19 @@ class FMU:
                 "make substeps= larger instead"
             )
 
-    def _check_platform(self, platform: str) -> None:
-        with zipfile.ZipFile(self.path) as archive:
-            folders = {
-                n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/") and n.count("/") > 1
-            }
+    def _check_platform(self, archive: Archive) -> None:
+        platform, folders = self.adapter.platform(), archive.platforms()
         if platform not in folders:
             raise FMUError(
-                f"{self.path} has no binary for {platform} (it has: {', '.join(sorted(folders)) or 'none'}); "
+                f"{self.path} has no binary for {platform} (it has: {', '.join(folders) or 'none'}); "
                 "export it again for this platform, or with its sources"
+            )
+        interfaces = (self.description.coSimulation, self.description.modelExchange)
+        wanted = [library_name(platform, i.modelIdentifier) for i in interfaces if i is not None]
+        if not set(wanted) & set(archive.names):
+            raise FMUError(
+                f"{self.path} has no library {' or '.join(dict.fromkeys(wanted))}, after the modelIdentifier "
+                "in its modelDescription.xml"
             )
 
     def shape_of(self, variable: Any) -> Shape:
@@ -221,7 +226,7 @@ class FMU:
 
     def start_values(self) -> dict[str, list[Any]]:
         """Return the start values that were given, by variable; refuse what does not fit."""
-        joined = self._ports(self.variables.values())
+        joined = self._ports(self.variables.values()) if self.start else {}
         found: dict[str, list[Any]] = {}
         for name, value in self.start.items():
             port = joined.get(name) or next(iter(self._ports([self.variables[name]]).values()))
@@ -254,17 +259,15 @@ class FMU:
             for u in self.description.outputs
             if u.variable.type in self.adapter.NUMBERS
         }
+        everything = set(self.input_ports)
         found: dict[str, set[str]] = {}
         for name, port in self.output_ports.items():
-            needs: set[str] = set()
-            for variable in port.variables:
-                listed = declared.get(self.key(variable))
-                if listed is None:
-                    needs |= set(self.input_ports)
-                else:
-                    numeric = (v for v in listed if v.type in self.adapter.NUMBERS)
-                    needs |= {port_of[self.key(v)] for v in numeric if self.key(v) in port_of}
-            found[name] = needs
+            listed = [declared.get(self.key(variable)) for variable in port.variables]
+            if any(d is None for d in listed):
+                found[name] = everything
+            else:
+                keys = (self.key(v) for d in listed for v in d or () if v.type in self.adapter.NUMBERS)
+                found[name] = {port_of[k] for k in keys if k in port_of}
         return found
 
     def key(self, variable: Any) -> tuple[str, int]:
@@ -276,47 +279,6 @@ class FMU:
             k for k, has in (("Co-Simulation", self.has_cs), ("Model Exchange", self.has_me)) if has
         )
         return f"FMU({self.path.name}: FMI {self.description.fmiVersion}, {kinds})"
-
-
-def read_description(path: Path) -> Any:
-    """Read and validate the model description of an FMU; return FMPy's object."""
-    import fmpy
-    from lxml.etree import XMLSyntaxError
-
-    if not path.is_file():
-        raise FMUError(f"there is no file {path}; give the path of an .fmu file")
-    if not zipfile.is_zipfile(path):
-        raise FMUError(f"{path} is no FMU: it is not a ZIP archive; was it copied completely?")
-    with zipfile.ZipFile(path) as archive:
-        if "modelDescription.xml" not in archive.namelist():
-            raise FMUError(f"{path} is no FMU: it has no modelDescription.xml at its top")
-        text = archive.read("modelDescription.xml")
-    found = re.search(rb'fmiVersion\s*=\s*"([^"]*)"', text)
-    version = found[1].decode(errors="replace") if found else "none"
-    if version != "2.0" and not version.startswith("3."):
-        raise FMUError(
-            f"{path} has FMI version {version}; FMI 2.0 and 3.0 are supported: export it as one of them"
-        )
-    try:
-        return fmpy.read_model_description(str(path))
-    except XMLSyntaxError as error:
-        raise FMUError(f"{path}: modelDescription.xml is broken: {error}") from error
-    except Exception as error:  # FMPy raises bare Exception for what its validation finds
-        raise FMUError(f"{path} has an invalid modelDescription.xml: {_first_lines(error)}") from error
-
-
-def _first_lines(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return " ".join(lines[:4])
-
-
-def _extracted(path: Path) -> Path:
-    import fmpy
-
-    try:
-        return Path(fmpy.extract(str(path)))
-    except Exception as error:  # FMPy raises bare Exception for an illegal path
-        raise FMUError(f"{path} cannot be extracted: {error}") from error
 
 
 def _plain(number: Number | None, value: Any) -> Any:

@@ -8,12 +8,18 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
+from .errors import FMUError
+
 Shape: TypeAlias = tuple[int, ...]
+
+#: values of one port: 80 MB of floats, exchanged at every step
+MAX_ELEMENTS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -48,28 +54,35 @@ def unit_of(variable: Any) -> str | None:
 
 def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[str, FMUPort]:
     """Return the ports of variables by name."""
-    groups: dict[str, dict[Shape, Any]] = {}
+    groups: dict[tuple[str, int], list[tuple[Shape, Any]]] = {}
     found: dict[str, FMUPort] = {}
     for v in variables:
         shape = shape_of(v)
-        match = re.fullmatch(r"(.*[^\]])\[(\d+(?:,\s*\d+)*)\]", v.name)
+        match = re.fullmatch(r"(.*[^\]])\[(\d{1,9}(?:,\s*\d{1,9})*)\]", v.name, re.DOTALL)
         if match and shape == ():
             index = tuple(int(i) for i in match[2].split(","))
-            groups.setdefault(match[1], {})[index] = v
+            groups.setdefault((match[1], len(index)), []).append((index, v))
         else:
             found[v.name] = _single(v, shape)
-    for base, members in groups.items():
-        shape = tuple(max(index[d] for index in members) for d in range(len(next(iter(members)))))
-        kinds = {(v.type, unit_of(v)) for v in members.values()}
-        ordered = sorted(members)
-        whole = len(members) == math.prod(shape) and ordered[0] == (1,) * len(shape)
-        if base in found or not whole or len(kinds) != 1:
-            found |= {v.name: _single(v, ()) for v in members.values()}
+    ranks = Counter(base for base, _ in groups)
+    for (base, rank), members in groups.items():
+        members.sort(key=lambda member: member[0])
+        shape = tuple(max(index[d] for index, _ in members) for d in range(rank))
+        kinds = {(v.type, unit_of(v)) for _, v in members}
+        whole = len({i for i, _ in members}) == len(members) == math.prod(shape)
+        alone = base not in found and ranks[base] == 1
+        if not alone or not whole or members[0][0] != (1,) * rank or len(kinds) != 1:
+            found |= {v.name: _single(v, ()) for _, v in members}
             continue
         type_, unit = kinds.pop()
-        found[base] = FMUPort(base, shape, unit, type_, tuple(members[i] for i in ordered))
+        found[base] = FMUPort(base, shape, unit, type_, tuple(v for _, v in members))
     return found
 
 
 def _single(v: Any, shape: Shape) -> FMUPort:
+    if math.prod(shape) > MAX_ELEMENTS:
+        raise FMUError(
+            f"variable {v.name[:80]} of shape {shape} has more than {MAX_ELEMENTS:,} values; "
+            "check its dimensions, or the structural parameters that give them"
+        )
     return FMUPort(v.name, shape, unit_of(v), v.type, (v,))

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
-from lxml import etree
-
+from .archive import Archive
 from .fmu_ports import unit_of
+from .model_description import parse, read_description
 from .scenario import aligned
 
 
 def inspection(path: Path) -> str:
     """Return capabilities, default experiment and variables of an FMU."""
-    from .fmu import read_description
-
-    description = read_description(path)
-    with zipfile.ZipFile(path) as archive:
-        names = archive.namelist()
-        root = etree.fromstring(archive.read("modelDescription.xml"))
-    platforms = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") > 1})
+    with Archive(path) as archive:
+        description, root, platforms = read_description(archive), parse(archive), archive.platforms()
     facts = [
         ("model", f"{description.modelName}, FMI {description.fmiVersion}"),
         ("made by", f"{description.generationTool or 'unknown'}, {description.generationDateAndTime or ''}"),
