@@ -24,7 +24,7 @@ from .fmi import Adapter
 from .fmi2 import Fmi2
 from .fmi3 import Fmi3
 from .fmu_ports import FMUPort, Shape, ports
-from .model_description import read_description
+from .model_description import description_of
 from .opcodes import Number
 from .participant import Participant, rate
 from .shared_library import library_name
@@ -98,7 +98,7 @@ class FMU:
         self.as_block = as_block
         self.every, self.sample_period = rate(self.path.name, every, sample_period)
         with Archive(self.path) as archive:
-            self.description = read_description(archive)
+            self.description = description_of(archive)
             self.adapter = _ADAPTERS[self.description.fmiVersion.partition(".")[0]]
             self.has_cs = self.description.coSimulation is not None
             self.has_me = self.description.modelExchange is not None

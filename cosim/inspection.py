@@ -7,14 +7,14 @@ from typing import Any
 
 from .archive import Archive
 from .fmu_ports import unit_of
-from .model_description import parse, read_description
+from .model_description import description_of, parse
 from .scenario import aligned
 
 
 def inspection(path: Path) -> str:
     """Return capabilities, default experiment and variables of an FMU."""
     with Archive(path) as archive:
-        description, root, platforms = read_description(archive), parse(archive), archive.platforms()
+        description, root, platforms = description_of(archive), parse(archive), archive.platforms()
     facts = [
         ("model", f"{description.modelName}, FMI {description.fmiVersion}"),
         ("made by", f"{description.generationTool or 'unknown'}, {description.generationDateAndTime or ''}"),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+from pathlib import Path
 from typing import Any
 
 from lxml import etree
@@ -19,10 +20,15 @@ from .errors import FMUError
 _LISTS = ("dependencies", "dependenciesKind", "clocks")
 
 
-def read_description(archive: Archive) -> Any:
-    """Read and validate the model description; return FMPy's object."""
-    root = parse(archive)
-    return _validated(archive, root)
+def read_description(path: Path) -> Any:
+    """Read and validate the model description of an FMU; return FMPy's object."""
+    with Archive(path) as archive:
+        return description_of(archive)
+
+
+def description_of(archive: Archive) -> Any:
+    """Return FMPy's object of an archive's model description."""
+    return _validated(archive, parse(archive))
 
 
 def parse(archive: Archive) -> Any:

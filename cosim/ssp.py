@@ -28,8 +28,9 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 
 from .errors import CosimError, WiringError, did_you_mean
-from .fmu import FMU, read_description
+from .fmu import FMU
 from .fmu_ports import unit_of
+from .model_description import read_description
 from .ssp_format import (
     FMU_TYPE,
     NAMESPACES,

@@ -31,8 +31,9 @@ from lxml import etree
 from cosim.errors import CosimError
 from cosim.fmi2 import Fmi2
 from cosim.fmi3 import Fmi3
-from cosim.fmu import FMU, read_description
+from cosim.fmu import FMU
 from cosim.fmu_ports import FMUPort, Shape, ports, unit_of
+from cosim.model_description import read_description
 from cosim.participant import Block
 from cosim.ssp_format import (
     ANNOTATION,
