@@ -184,7 +184,7 @@ class _Writer:
         root = etree.Element(
             tag(SSD, "SystemStructureDescription"),
             {"version": self.version, "name": name, "generationTool": "structcosim"},
-            nsmap=NAMESPACES,
+            nsmap={**NAMESPACES, "osp": _OSP[1]},  # here: libcosim stumbles over one further down
         )
         system = _add(root, SSD, "System", name=name)
         elements = _add(system, SSD, "Elements")
@@ -218,7 +218,7 @@ class _Writer:
             _annotate(notes, "participant", facts)
             if "samplePeriod" in facts:
                 note = _add(notes, SSC, "Annotation", type=_OSP[0])
-                hint = etree.SubElement(note, f"{{{_OSP[1]}}}StepSizeHint", nsmap={"osp": _OSP[1]})
+                hint = etree.SubElement(note, f"{{{_OSP[1]}}}StepSizeHint")
                 hint.set("value", facts["samplePeriod"])
 
     def _connectors(self, part: _Part) -> dict[str, tuple[FMUPort, str]]:
@@ -354,7 +354,7 @@ class _Writer:
             notes = _add(experiment, SSD, "Annotations")
             _annotate(notes, "experiment", {"step": repr(float(step))})
             note = _add(notes, SSC, "Annotation", type=_OSP[0])
-            algorithm = etree.SubElement(note, f"{{{_OSP[1]}}}Algorithm", nsmap={"osp": _OSP[1]})
+            algorithm = etree.SubElement(note, f"{{{_OSP[1]}}}Algorithm")
             fixed = etree.SubElement(algorithm, f"{{{_OSP[1]}}}FixedStepAlgorithm")
             fixed.set("baseStepSize", repr(float(step)))
 
