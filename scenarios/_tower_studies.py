@@ -232,10 +232,12 @@ def coupling(run_all: Runner, common: Row) -> list[Row]:
 
 
 def _coupling_text(rows: list[Row]) -> str:
-    lines = [f"{'step (ms)':>10} {'error of x76':>14} {'error of x_m':>14} {'order':>7}"]
+    lines = [f"{'step (ms)':>10} {'coupling':>10} {'error of x76':>14} {'error of x_m':>14} {'order':>7}"]
     for row in rows:
         order = "" if row["order"] is None else f"{row['order']:.2f}"
-        lines.append(f"{1e3 * row['step']:10g} {row['x76']:14.3e} {row['x_m']:14.3e} {order:>7}")
+        lines.append(
+            f"{1e3 * row['step']:10g} {row['coupling']:>10} {row['x76']:14.3e} {row['x_m']:14.3e} {order:>7}"
+        )
     return "\n".join([*lines, "peak error over peak response, against the one plant at the same step"])
 
 
