@@ -143,8 +143,8 @@ def test_the_same_numbers_elsewhere(tmp_path, tool, name):
     for i, port in enumerate(ports):
         expected = column(ours, port)
         assert np.ptp(expected) > 0.1, port
-        # the same calls with the same numbers; FMPy's sum of steps is some units in the last place off k h
-        bound = 1e-12 * np.abs(expected).max() if tool is fmpy else 0.0
+        # the same calls with the same numbers; the sine reads the time, which these tools sum up
+        bound = 1e-12 * np.abs(expected).max() if name == "at rest" else 0.0
         assert np.abs(theirs[1:, i] - expected[1:]).max() <= bound, port
 
 
