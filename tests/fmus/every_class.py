@@ -99,7 +99,7 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     EquivalentForce: [lambda: equivalent_force(model(), np.eye(4))[1]],
     # chapter 3
     SCWNN: [lambda: SCWNN.of_size(2, 30)],
-    KinematicObserver: [lambda: KinematicObserver(T=_random(4, 2))],
+    KinematicObserver: [lambda: KinematicObserver(T=_random(2, 2))],
     ViscousDampers: [lambda: ViscousDampers(p=3)],
     # gain laws of chapter 4
     SlidingSurface: [lambda: SlidingSurface(a=1.5)],
