@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from .errors import FMUError
+from .errors import FMUError, SnapshotError
 from .fmu import FMU
 from .fmu_ports import FMUPort
 from .instances import Failures, buffer
@@ -95,14 +96,15 @@ class FMUInstance:
         """Terminate and free the instance; after a fatal error it must not be called any more."""
         if self.fmi.status == 4:
             return
+        ends = [partial(self.api.freeFMUState, state) for state in self.kept]
         if self.running and self.fmi.status < 3:
+            ends.append(self.api.terminate)
+        for end in ends:
             try:
-                self.api.terminate()
-            except Exception as error:  # the run is over; an FMU that cannot terminate is reported, not fatal
-                self.fmi.messages.append(f"[warning] terminate failed: {error}")
+                end()
+            except Exception as error:  # the run is over; an FMU that cannot end is reported, not fatal
+                self.fmi.messages.append(f"[warning] {error}")
         self.running = False
-        for pointer in self.kept:
-            self.api.freeFMUState(pointer)
         self.api.freeInstance()
 
     @property
@@ -130,6 +132,11 @@ class FMUInstance:
     def restore(self, saved: Any) -> None:
         """Return to what `save` returned, which stays as it is."""
         arrays, kept = saved
+        if self.fmi.status == 4:
+            raise SnapshotError(
+                f"{self.name} ended with a fatal error and takes no calls any more; start anew"
+            )
+        self.fmi.status = 0
         state = kept
         if isinstance(kept, bytes):
             deserialise = self.api.deserializeFMUState

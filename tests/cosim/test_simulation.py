@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cosim import FMU, Block, Input, Output, Simulation, State, System, simulate
+from cosim import FMU, Block, Continuous, Input, Output, Simulation, State, System, simulate
 from cosim.blocks import SensorDynamics, WhiteNoise
 from cosim.errors import SimulationError, SnapshotError, TimeError
 from fmus.export import export
@@ -156,6 +156,42 @@ def test_a_simulation_goes_on_after_a_failure_only_from_a_snapshot():
         assert simulation.run(0.5)["f.y"] == pytest.approx([0.3, 0.4, 0.5])
     with pytest.raises(SimulationError, match="it is closed; make a new one"):
         simulation.run(1.0)
+
+
+class Falling(Block):
+    """y = 1 - t"""
+
+    y = Output()
+
+    def step(self, t, h):
+        self.y = 1.0 - t
+
+
+class Root(Continuous):
+    """x' = -x, y = sqrt(u) x: not a number for u < 0"""
+
+    u = Input(start=1.0)
+    x = State(2.0)
+    y = Output()
+
+    def derivatives(self, t):
+        self.der_x = -self.x
+
+    def outputs(self, t):
+        self.y = np.sqrt(self.u) * self.x
+
+
+def test_an_fmu_that_failed_is_taken_back(tmp_path):
+    """At t = 1.1 the input is negative; what the FMU gives is refused, and its state returns."""
+    system = System({"f": Falling(), "r": FMU(export(Root(), tmp_path / "root.fmu"))}, [("f.y", "r.u")])
+    with Simulation(system, step=0.1, record=["r.y"]) as simulation:
+        simulation.run(0.5)
+        there = simulation.snapshot()
+        with pytest.raises(SimulationError, match="not finite|fmi2Error") as caught:
+            simulation.run(2.0)
+        simulation.restore(there)
+        again = simulation.run(1.0)
+        assert np.array_equal(again["r.y"], caught.value.result["r.y"][: len(again.time)])
 
 
 def test_participants_that_cannot_keep_their_state_are_named(tmp_path):
