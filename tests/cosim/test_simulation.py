@@ -187,7 +187,7 @@ def test_an_fmu_that_failed_is_taken_back(tmp_path):
     with Simulation(system, step=0.1, record=["r.y"]) as simulation:
         simulation.run(0.5)
         there = simulation.snapshot()
-        with pytest.raises(SimulationError, match="not finite|fmi2Error") as caught:
+        with pytest.raises(SimulationError, match=r"not finite|fmi2Error") as caught:
             simulation.run(2.0)
         simulation.restore(there)
         again = simulation.run(1.0)
