@@ -31,6 +31,7 @@ from .opcodes import SLACK, Op
 from .variables import Array
 
 _MAY_RETURN = "0"  # noSetFMUStatePriorToCurrentPoint: a simulation may return to a snapshot
+INLINE_PAIRS = 64  # of copies between connected ports; the compiler takes a minute for 20,000 of them
 INLINE = 8  # up to so many floats an operation is written out, above it is a loop
 
 _LIBRARY = """
@@ -132,9 +133,9 @@ class _Writer:
         """Store a float."""
         self.lines.append(f"  store double {value}, ptr {address}")
 
-    def each(self, n: int, body: Callable[[int | str], None]) -> None:
+    def each(self, n: int, body: Callable[[int | str], None], inline: int = INLINE) -> None:
         """Write body(i) for i = 0 .. n - 1: one after the other, or as a loop when they are many."""
-        if n <= INLINE:
+        if n <= inline:
             for element in range(n):
                 body(element)
             return
@@ -287,9 +288,12 @@ def _from_float(w: _Writer, op: Op) -> None:
 
 def _gather(w: _Writer, op: Op) -> None:
     pairs = w.word(1)
-    for i in range(op.n):
-        source, target = (w.load(w.at(pairs, 2 * i + j), "ptr") for j in (0, 1))
+
+    def one(i: int | str) -> None:
+        source, target = (w.load(w.at(pairs, i, 2, j), "ptr") for j in (0, 1))
         w.store(w.load(source), target)
+
+    w.each(op.n, one, inline=INLINE_PAIRS)
 
 
 def _fmi_values(w: _Writer, op: Op) -> None:

@@ -97,6 +97,9 @@ class System:
     ) -> None:
         self.participants: dict[str, Member] = {}
         self.connections: list[Connection] = []
+        #: the connections of every input port, and the pairs of participants that are connected without delay
+        self._feeding: dict[tuple[str, str], list[Connection]] = {}
+        self._links: set[tuple[str, str]] = set()
         for name, member in (participants or {}).items():
             self.add(name, member)
         for source, target in connections:
@@ -142,12 +145,11 @@ class System:
                 f"{into} has shape {into.shape if not into.index else (into.count,)}; "
                 "connect elements or slices, such as building.accel[2:4]"
             )
-        for other in self.connections:
-            same = (other.target.participant, other.target.name) == (into.participant, into.name)
-            overlap = other.target.first < into.first + into.count and into.first < (
+        feeding = self._feeding.setdefault((into.participant, into.name), [])
+        for other in feeding:
+            if other.target.first < into.first + into.count and into.first < (
                 other.target.first + other.target.count
-            )
-            if same and overlap:
+            ):
                 raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
         try:
             scale, offset = transformation or conversion(out.unit, into.unit)
@@ -155,12 +157,19 @@ class System:
             raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
         if not (math.isfinite(scale) and math.isfinite(offset)):
             raise WiringError(f"{out} -> {into}: transformation {transformation} is not finite")
-        self.connections.append(Connection(out, into, scale, offset, _initial(out, initial)))
+        connection = Connection(out, into, scale, offset, _initial(out, initial))
+        self.connections.append(connection)
+        feeding.append(connection)
+        link = (out.participant, into.participant)
+        if link in self._links or initial is not None:
+            return  # the order of blocks is what it was
         try:
             self.block_order()
         except WiringError:
             self.connections.pop()
+            feeding.pop()
             raise
+        self._links.add(link)
 
     def port(self, text: str, direction: str) -> Port:
         """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
