@@ -3,7 +3,7 @@
 from cosim import Block, Continuous, FMU, Input, Output, Parameter, State, System, simulate
 """
 
-from .errors import CosimError
+from .errors import CosimError, SimulationEndedWarning
 from .fmu import FMU
 from .master import schedule, simulate
 from .participant import Block, Continuous, LinearContinuous
@@ -26,6 +26,7 @@ __all__ = [
     "Parameter",
     "Result",
     "Simulation",
+    "SimulationEndedWarning",
     "Snapshot",
     "State",
     "System",

@@ -17,10 +17,9 @@ from .fmi import StepAnswer
 from .fmu import FMU
 from .fmu_events import EVENT_ITERATIONS, EventInstance
 from .instances import Failures
-from .opcodes import TERMINATED, Op
+from .opcodes import SLACK, Op
 
-#: of the communication step: what is closer than this to an instant is at it
-_ROUNDING = 1e-9
+_DISCARD = 2
 
 
 class CoSimulationInstance(EventInstance):
@@ -37,8 +36,7 @@ class CoSimulationInstance(EventInstance):
         """Take the FMU through initialization and, in event mode, the events of the start."""
         super().start(t0)
         if self.event_mode:
-            self._discrete_states(t0)
-            self._resume()
+            self._start_events(t0)
 
     def step(self, fraction: float = 0.0) -> list[Op]:
         """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
@@ -50,22 +48,33 @@ class CoSimulationInstance(EventInstance):
         function = self._function(f"{self.fmi.PREFIX}DoStep")
         op = Op(f"{self.name}: step (FMU)", self.fmi.DO_STEP, function, self._component)
         answer = self.fmi.answer
-        if answer is not None:
+        if answer is None:
+            self.step_callback = self.failures.guard(self.name, self._discarded)
+        else:
+            op = replace(op, b=int(answer.flags.ctypes.data), c=int(answer.times.ctypes.data))
             self.step_callback = self.failures.guard(self.name, lambda t, h: self._finish_step(answer, t, h))
-            callback = ctypes.cast(self.step_callback, ctypes.c_void_p).value or 0
-            op = replace(op, b=int(answer.flags.ctypes.data), c=int(answer.times.ctypes.data), d=callback)
-        return [replace(op, participant=self.name)]
+        callback = ctypes.cast(self.step_callback, ctypes.c_void_p).value or 0
+        return [replace(op, d=callback, participant=self.name)]
 
     def _resume(self) -> None:
         self.fmi.attempt("enter step mode", self.api.enterStepMode)
 
+    def _discarded(self, t: float, h: float) -> None:
+        """Find out why a step of FMI 2.0 was discarded: to end the run, or because it failed."""
+        last = self.fmi.asks_to_end()
+        if last is None:
+            raise SimulationError(self.fmi.logged(self.fmi.failure(_DISCARD, t)))
+        self.failures.ask_to_end(self.name, last, last >= t + h - SLACK * h)
+
     def _finish_step(self, answer: StepAnswer, t: float, h: float) -> None:
         """Go on with the step over [t, t + h] from where it was interrupted, until its end."""
-        end, near = t + h, _ROUNDING * h
+        end, near = t + h, SLACK * h
         now, stuck = answer.came_to(end), 0
         while True:
+            if answer.terminate:
+                self.failures.ask_to_end(self.name, now, now >= end - near)
             if self.event_mode and (answer.event or self.event_time[0] <= now):
-                self._event(now)
+                self._event(now, now >= end - near)
             if now >= end - near:
                 answer.flags[:] = 0
                 return
@@ -85,5 +94,3 @@ class CoSimulationInstance(EventInstance):
 
     def _do_step(self, answer: StepAnswer, t: float, h: float) -> None:
         answer.take(*self.fmi.attempt("do its step", lambda: self.api.doStep(t, h, False)))
-        if answer.terminate:
-            raise SimulationError(self.fmi.failure(TERMINATED, True, t, h))

@@ -39,12 +39,7 @@ class ContinuousTime:
 
     def _done(self, status: int, what: str) -> None:
         if status > 1:
-            self.fmi.status = status
-            log = "".join(f"\n  {line}" for line in self.fmi.messages[-8:])
-            raise SimulationError(
-                f"{self.fmi.failure(status, False, self.t, 0.0)} (it was to {what})"
-                + (f"\n  log of the FMU:{log}" if log else "")
-            )
+            raise SimulationError(self.fmi.logged(self.fmi.failure(status, self.t, f" to {what}")))
 
     def set_time(self, t: float) -> None:
         """Set the time."""

@@ -10,6 +10,7 @@ from fmpy.sundials import CVodeSolver
 from fmpy.sundials.cvode import CV_ROOT_RETURN, CVode, CVodeReInit, sundials_cvode
 from fmpy.sundials.libraries import sundials_core
 from fmpy.sundials.nvector_serial import NV_DATA_S
+from fmpy.sundials.sundials_context import SUNContext_PushErrHandler
 
 from .continuous_time import ContinuousTime
 from .errors import SimulationError
@@ -55,6 +56,9 @@ class Cvode(CVodeSolver):
             relativeTolerance=tolerance,
         )
         _no_warnings(self.cvode_mem, -1)  # of steps too small to be seen: EventSteps sees them
+        # what is printed by SUNDIALS itself is in our error
+        sundials_core.SUNContext_ClearErrHandlers(self.sunctx)
+        SUNContext_PushErrHandler(self.sunctx, self.ehfun_, None)
 
     def __del__(self) -> None:
         """Free what FMPy leaves, in the order of SUNDIALS: the integrator, its parts, the context."""

@@ -46,6 +46,10 @@ class SnapshotError(CosimError):
     """A state that cannot be saved or returned to."""
 
 
+class SimulationEndedWarning(UserWarning):
+    """A participant asked to end the run before its stop time: a normal end; see `Result.ended`."""
+
+
 class SimulationError(CosimError):
     """A run that had to stop. What was computed until then is in `result`."""
 

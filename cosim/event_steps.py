@@ -84,7 +84,7 @@ class EventSteps:
     completed
         tells the model of a completed step at t; returns whether it asks for an event
     event
-        handles an event at t
+        handles an event at t; both know whether that is at the end of the communication step
     next_event
         (1,) time of the next time event, infinity if there is none
     """
@@ -93,8 +93,8 @@ class EventSteps:
         self,
         model: ContinuousTime,
         mover: Mover,
-        completed: Callable[[float], bool],
-        event: Callable[[float], None],
+        completed: Callable[[float, bool], bool],
+        event: Callable[[float, bool], None],
         next_event: Array,
         interrupted: Callable[[], bool],
     ) -> None:
@@ -118,9 +118,10 @@ class EventSteps:
             else:
                 t = until
                 self.model.set_time(t)
-            asked = self.completed(t)
+            at_end = t >= end - SLACK * h
+            asked = self.completed(t, at_end)
             if root or asked or (timed and t >= until):
-                self.event(t)
+                self.event(t, at_end)
                 if t < end:
                     self.mover.restart(t)
             if t >= end:

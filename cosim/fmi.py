@@ -16,7 +16,7 @@ import numpy as np
 
 from .errors import FMUError
 from .fmu_ports import Shape
-from .opcodes import TERMINATED, Number
+from .opcodes import Number
 from .shared_library import check_library, library_name
 from .variables import Array
 
@@ -52,7 +52,7 @@ class StepAnswer:
 
     def came_to(self, until: float) -> float:
         """Return how far a step until `until` came."""
-        return min(float(self.times[0]), until) if self.flags[2] else until
+        return min(float(self.times[0]), until) if self.flags[1:].any() else until
 
     def take(self, event: bool, terminate: bool, early: bool, last: float) -> None:
         """Keep what FMPy's doStep returned."""
@@ -134,9 +134,9 @@ class Adapter(ABC):
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
 
-    @abstractmethod
-    def end_of_step(self, status: int) -> tuple[int, float | None]:
-        """Return what a failed step was (TERMINATED, or its status), and how far it came."""
+    def asks_to_end(self) -> float | None:
+        """Return the time that a discarded step came to if that means that the FMU asks to end the run."""
+        return None
 
     def set(self, variable: Any, values: Sequence[Any]) -> None:
         """Set the values of a variable."""
@@ -161,15 +161,14 @@ class Adapter(ABC):
             text = (message or b"").decode(errors="replace")
             self.messages.append(f"[{_LABELS.get(status, 'warning')}] {text}")
 
-    def failure(self, status: int, is_step: bool, t: float, h: float) -> str:
-        """Return what a status of the loop means; `t` is when the call was made, `h` the step."""
-        where = f"at t = {t:g} s"
-        last = None
-        if is_step:
-            status, last = self.end_of_step(status)
-        reached = "" if last is None else f" (it came to t = {last:g} s)"
-        if status == TERMINATED:
-            return f"{self.name} asked to end the simulation in the step from t = {t:g} s{reached}"
+    def failure(self, status: int, t: float, what: str = "") -> str:
+        """Return what it means that a function returned a status at t, and remember it for the end."""
+        self.status = status
         label = _LABELS.get(status)
         named = f"{self.PREFIX}{label.capitalize()}" if label else f"status {status}"
-        return f"{self.name} failed {where} with {named}; look at its inputs and at its log"
+        return f"{self.name} failed{what} at t = {t:g} s with {named}; look at its inputs and at its log"
+
+    def logged(self, text: str) -> str:
+        """Return an error message with the end of the FMU's log."""
+        lines = self.messages[-8:]
+        return text + "".join(["\n  log of the FMU:", *(f"\n  {line}" for line in lines)]) if lines else text

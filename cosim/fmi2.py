@@ -8,7 +8,7 @@ from typing import Any
 
 from .fmi import Adapter
 from .fmu_ports import Shape
-from .opcodes import FMI2_COMPLETED, FMI2_DO_STEP, FMI2_VALUES, NUMBERS, TERMINATED, Number
+from .opcodes import FMI2_COMPLETED, FMI2_DO_STEP, FMI2_VALUES, NUMBERS, Number
 
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # fmi2StatusKind
 
@@ -80,13 +80,11 @@ class Fmi2(Adapter):
         """Get values."""
         return self.attempt("get its inputs", lambda: getattr(self.api, f"get{access}")(references))  # type: ignore[no-any-return]
 
-    def end_of_step(self, status: int) -> tuple[int, float | None]:
-        """Ask an FMU that discarded a step whether it wants to end."""
-        if status != 2:
-            return status, None
+    def asks_to_end(self) -> float | None:
+        """Ask an FMU that discarded a step whether it wants to end the run."""
         try:
             terminated = self.api.getBooleanStatus(_TERMINATED)
             last = self.api.getRealStatus(_LAST_SUCCESSFUL_TIME)
         except Exception:  # an FMU need not be able to say why; FMPy raises bare Exception
-            return status, None
-        return TERMINATED if terminated else status, float(last)
+            return None
+        return float(last) if terminated else None

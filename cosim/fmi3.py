@@ -12,7 +12,7 @@ from typing import Any
 from .errors import FMUError
 from .fmi import Adapter, StepAnswer
 from .fmu_ports import Shape
-from .opcodes import FMI3_COMPLETED, FMI3_DO_STEP, FMI3_VALUES, NUMBERS, TERMINATED, Number
+from .opcodes import FMI3_COMPLETED, FMI3_DO_STEP, FMI3_VALUES, NUMBERS, Number
 
 
 class Fmi3(Adapter):
@@ -101,8 +101,3 @@ class Fmi3(Adapter):
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
         return self.attempt("get its inputs", lambda: getattr(self.api, f"get{access}")(references, count))  # type: ignore[no-any-return]
-
-    def end_of_step(self, status: int) -> tuple[int, float | None]:
-        """Return the status that the loop made of the flags, and the last successful time."""
-        assert self.answer is not None
-        return status, float(self.answer.times[0]) if status == TERMINATED else None

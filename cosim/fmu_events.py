@@ -57,26 +57,34 @@ class EventInstance(FMUInstance):
                 x.told[:] = x.raw
                 values, references = x.raw.tolist(), x.references.tolist()
                 setter = getattr(self.api, f"set{x.access}")
-                self._event(t, lambda: setter(references, values))
+                self._event(t, False, lambda: setter(references, values))
 
         self.input_callbacks.append(self.failures.guard(self.name, tell))
         address = ctypes.cast(self.input_callbacks[-1], ctypes.c_void_p).value or 0
         return Op(f"{self.name}: discrete inputs (Python callback)", CALL, address, participant=self.name)
 
-    def _event(self, t: float, change: Callable[[], Any] = lambda: None) -> None:
+    def _event(self, t: float, at_end: bool, change: Callable[[], Any] = lambda: None) -> None:
+        """Handle an event at t, inside a step or at its end; inputs may change."""
         self.fmi.attempt("enter event mode", self.api.enterEventMode)
         self.fmi.attempt("set its discrete inputs", change)
-        self._discrete_states(t)
+        ends = self._discrete_states(t)
+        self._resume()
+        if ends:
+            self.failures.ask_to_end(self.name, t, at_end)
+
+    def _start_events(self, t0: float) -> None:
+        """Handle the events of the start."""
+        if self._discrete_states(t0):
+            raise SimulationError(f"{self.name} asked to end the simulation at its start, t = {t0:g} s")
         self._resume()
 
-    def _discrete_states(self, t: float) -> None:
+    def _discrete_states(self, t: float) -> bool:
+        """Update the discrete states until they stay; return whether the FMU asks to end the run."""
         for _ in range(EVENT_ITERATIONS):
             again, end, _, _, timed, time = self.fmi.attempt(
                 "update its discrete states", self.fmi.discrete_states
             )
-            if end:
-                raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s, in an event")
-            if not again:
+            if end or not again:
                 self.event_time[0] = time if timed else np.inf
-                return
+                return bool(end)
         raise FMUError(f"{self.name}: the event at t = {t:g} s does not end in {EVENT_ITERATIONS} iterations")

@@ -16,7 +16,7 @@ from .errors import FMUError, SnapshotError
 from .fmu import FMU
 from .fmu_ports import FMUPort
 from .instances import Failures, buffer
-from .opcodes import FROM_FLOAT, TERMINATED, TO_FLOAT, Number, Op
+from .opcodes import FROM_FLOAT, TO_FLOAT, Number, Op
 
 
 class Exchange:
@@ -155,11 +155,6 @@ class FMUInstance:
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
         return [array for x in [*self.inputs, *self.outputs] for array in (x.values, x.raw, x.told)]
-
-    def failure(self, op: Op, status: int, t: float, h: float) -> str:
-        """Return what it means that an operation ended with a status, and remember it for the end."""
-        self.fmi.status = status if status < TERMINATED else 0
-        return self.fmi.failure(status, op.code == self.fmi.DO_STEP, t, h * op.every)
 
     # ---------------------------------------------------------------------- operations
 

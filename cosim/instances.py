@@ -24,8 +24,16 @@ from .variables import Array
 _KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
 
 
+class EndOfRun(Exception):
+    """A participant asks, inside a step, to end the run: a normal end, but the step is not completed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.text = text
+
+
 class Failures:
-    """Where callbacks leave an exception for the master; a C loop cannot carry it."""
+    """Where callbacks leave an exception or a request to end for the master; a C loop cannot carry it."""
 
     def __init__(self) -> None:
         self.exception: BaseException | None = None
@@ -33,10 +41,30 @@ class Failures:
         self.time = 0.0
         #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
         self.interrupted = False
+        #: who asked to end the run, and when; "" while nobody does
+        self.end = ""
+        #: (1,) 1 when the loop is to end at the next point
+        self.stop = np.zeros(1, dtype=np.int64)
 
     def clear(self) -> None:
         """Forget what happened: the simulation goes on from where it stands, or from a snapshot."""
         self.exception, self.interrupted = None, False
+        self.set_end("")
+
+    def set_end(self, text: str) -> None:
+        """Let the run end at the next point, or go on if the text is empty."""
+        self.end, self.stop[0] = text, bool(text)
+
+    def ask_to_end(self, name: str, t: float, at_end: bool) -> None:
+        """Note that a participant asks at t to end the run.
+
+        At the end of a step the run goes on to the communication point that is reached;
+        inside it, EndOfRun leaves the step.
+        """
+        text = f"{name} asked to end the simulation at t = {t:.10g} s"
+        if not at_end:
+            raise EndOfRun(text)
+        self.set_end(self.end or text)
 
     def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
         """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""

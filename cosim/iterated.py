@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import SimulationError, WiringError
+from .instances import EndOfRun
 from .loop import Loop
 from .opcodes import CALL, Op
 from .quasi_newton import NoConvergence, QuasiNewton
@@ -86,10 +87,11 @@ class IteratedCoupling:
         self._t0 = t0
         every = list(self._instances.values())
         latch = [op for i in every for op in i.latch()]
-        look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [])
+        stop = self._program.failures.stop
+        look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [], stop)
         after = [op for i in every for op in i.read(1.0)]
-        move = Loop([*latch, *(op for i in every for op in i.advance())], [])
-        self._loops = move, Loop([*latch, *after], [])
+        move = Loop([*latch, *(op for i in every for op in i.advance())], [], stop)
+        self._loops = move, Loop([*latch, *after], [], stop)
 
         def g(w: Array) -> Array:
             self._hold(w)
@@ -106,13 +108,14 @@ class IteratedCoupling:
         move, look = self._loops
         k = round((t - self._t0) / h)
         saved = {name: instance.save(serialised=False) for name, instance in self._instances.items()}
-        moved = False
+        moved, asked = False, self._program.failures.end
 
         def g(w: Array) -> Array:
             nonlocal moved
             if moved:
                 for name, instance in self._instances.items():
                     instance.restore(saved[name])
+                self._program.failures.set_end(asked)
             moved = True
             self._hold(0.5 * (self._w + w))
             self._run(move, k)
@@ -148,6 +151,8 @@ class IteratedCoupling:
         """Run operations once, at t_k."""
         program = self._program
         if loop.run(k, k + 1, k, self._t0, program.h):
+            if isinstance(program.failures.exception, EndOfRun):
+                raise program.failures.exception
             row, _, status = (int(x) for x in loop.report[:3])
             raise program.error(loop.rows[row], self._t0, k, status)
 

@@ -5,12 +5,13 @@ run to run, the addresses, comes from a table of five words a row (function, a, 
 So systems of one shape share one text, which is compiled once a process, in hundredths
 of a second and without Numba.
 
-    i32 run(ptr table, i64 k0, i64 k1, i64 last, double t0, double h, ptr report, i64 resume)
+    i32 run(ptr table, i64 k0, i64 k1, i64 last, double t0, double h, ptr report, i64 resume, ptr stop)
 
 runs the points k0 <= k < k1 of a system whose last point is `last`: at every point the
 first operations, at every point but the last the second ones as well, which carry the
 system to the next. With `resume` the first ones have run at k0 already, as at the end of
-the run that is resumed. An operation with `fraction` c runs at t = t0 + (k + c) h.
+the run that is resumed. When a callback has set `stop`, the point that comes next is the
+last one. An operation with `fraction` c runs at t = t0 + (k + c) h.
 
 report: five int64, row and k where it stopped, status there, recorded rows, sampled
 points. It returns 0, or 1 when an operation failed; then the status is what the function
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -63,16 +65,18 @@ fine:
 """
 
 _HEAD = """
-define i32 @run(ptr %table, i64 %k0, i64 %k1, i64 %last, double %t0, double %h, ptr %report, i64 %resume) {
+define i32 @run(ptr %table, i64 %k0, i64 %k1, i64 %last, double %t0, double %h,
+                 ptr %report, i64 %resume, ptr %stop) {
 entry:
   %resumes = icmp ne i64 %resume, 0
+  %reached = getelementptr i64, ptr %report, i64 1
   %recorded = getelementptr i64, ptr %report, i64 3
   %sampled = getelementptr i64, ptr %report, i64 4
   br label %point
 point:
   %k = phi i64 [ %k0, %entry ], [ %knext, %nextpoint ]
   %go = icmp slt i64 %k, %k1
-  br i1 %go, label %begin, label %done
+  br i1 %go, label %begin, label %past
 begin:
   %kf = sitofp i64 %k to double
   %start = icmp eq i64 %k, %k0
@@ -307,7 +311,18 @@ def _fmi_values(w: _Writer, op: Op) -> None:
 
 
 def _fmi2_do_step(w: _Writer, op: Op) -> None:
-    w.check_fmi(w.call("ptr double double i32", w.word(1), w.time(op.fraction), w.step(op), _MAY_RETURN))
+    t, h = w.time(op.fraction), w.step(op)
+    status = w.call("ptr double double i32", w.word(1), t, h, _MAY_RETURN)
+    discarded, judged, on = (w.label() for _ in range(3))
+    w.lines.append(f"  br i1 {w.value(f'icmp eq i32 {status}, 2')}, label %{discarded}, label %{judged}")
+    w.start_block(discarded)
+    answer = w.value(f"call i32 {w.word(4)}(ptr null, double {t}, double {h})")
+    w.check(w.value(f"sext i32 {answer} to i64"))
+    w.lines.append(f"  br label %{on}")
+    w.start_block(judged)
+    w.check_fmi(status)
+    w.lines.append(f"  br label %{on}")
+    w.start_block(on)
 
 
 def _fmi3_do_step(w: _Writer, op: Op) -> None:
@@ -325,10 +340,9 @@ def _fmi3_do_step(w: _Writer, op: Op) -> None:
     w.start_block(whole)
     kinds = "ptr double double i32 ptr ptr ptr ptr"
     w.check_fmi(w.call(kinds, w.word(1), t, h, _MAY_RETURN, event, terminate, early, times))
-    ends = w.value(f"icmp ne i8 {w.load(terminate, 'i8')}, 0")
-    w.check(w.value(f"select i1 {ends}, i64 {opcodes.TERMINATED}, i64 0"))
     either = w.value(f"or i8 {w.load(event, 'i8')}, {w.load(early, 'i8')}")
-    asked = w.value(f"icmp ne i8 {either}, 0")
+    any_flag = w.value(f"or i8 {either}, {w.load(terminate, 'i8')}")
+    asked = w.value(f"icmp ne i8 {any_flag}, 0")
     w.lines.append(f"  br i1 {asked}, label %{interrupted}, label %{on}")
     w.start_block(interrupted)
     status = w.value(f"call i32 {w.word(4)}(ptr null, double {t}, double {h})")
@@ -412,14 +426,17 @@ class Loop:
 
     report
         row and k where it stopped, status there, recorded rows, sampled points
+    stop
+        (1,) set by a callback when the next point is to be the last
     """
 
-    def __init__(self, first: list[Op], second: list[Op]) -> None:
+    def __init__(self, first: list[Op], second: list[Op], stop: np.ndarray[Any, np.dtype[np.int64]]) -> None:
         self.rows = [*first, *second]
         self.report = np.zeros(5, dtype=np.int64)
+        self.stop = stop
         self._table = np.array([op.operands() for op in self.rows], dtype=np.int64)
         integer, real, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
-        kinds = (pointer, integer, integer, integer, real, real, pointer, integer)
+        kinds = (pointer, integer, integer, integer, real, real, pointer, integer, pointer)
         self._function = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(loop_ir(first, second))("run"))
 
     def record_to(self, data: Array) -> None:
@@ -431,7 +448,8 @@ class Loop:
     def run(self, k: int, until: int, last: int, t0: float, h: float, resume: bool = False) -> bool:
         """Run the points k to until - 1; tell whether an operation failed."""
         table, report = self._table.ctypes.data, self.report.ctypes.data
-        return bool(self._function(table, k, until, last, t0, h, report, resume))
+        stop = self.stop.ctypes.data
+        return bool(self._function(table, k, until, last, t0, h, report, resume, stop))
 
 
 def loop_ir(first: list[Op], second: list[Op]) -> str:
@@ -439,12 +457,15 @@ def loop_ir(first: list[Op], second: list[Op]) -> str:
     w = _Writer()
     for op in first:
         _operation(w, op)
-    w.lines.append("  %more = icmp slt i64 %k, %last\n  br i1 %more, label %carry, label %done")
+    w.lines.append("  %stopped = load i64, ptr %stop\n  %runs = icmp eq i64 %stopped, 0")
+    w.lines.append("  %before = icmp slt i64 %k, %last\n  %more = and i1 %before, %runs")
+    w.lines.append("  br i1 %more, label %carry, label %done")
     w.start_block("carry")
     for op in second:
         _operation(w, op)
     w.lines.append("  br label %nextpoint\nnextpoint:\n  %knext = add i64 %k, 1\n  br label %point")
-    w.lines.append("done:\n  ret i32 0")
+    w.lines.append("past:\n  br label %done")
+    w.lines.append("done:\n  store i64 %k, ptr %reached\n  ret i32 0")
     if w.failures:
         rows = ", ".join(f"[ {row}, %{block} ]" for block, row, _ in w.failures)
         statuses = ", ".join(f"[ {status}, %{block} ]" for block, _, status in w.failures)

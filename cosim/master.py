@@ -51,7 +51,9 @@ def simulate(
 
     Raises CosimError for what can be checked before the run, SimulationError (with
     `result`, what was computed) when a participant fails or gives a value that is not
-    finite, Interrupted (with `result`) on Ctrl-C.
+    finite, Interrupted (with `result`) on Ctrl-C. When a participant asks to end the run,
+    that is no error: the result up to there is returned, `result.ended` says who and when,
+    and SimulationEndedWarning is warned.
     """
     check_time(step, start, stop)
     steps_between(stop - start, step, "the time from start to stop")  # before FMUs are loaded

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .continuous_time import ContinuousTime
-from .errors import FMUError, SimulationError
+from .errors import FMUError
 from .event_steps import EventSteps, RungeKutta
 from .fmu import FMU
 from .fmu_events import EventInstance
@@ -60,8 +60,7 @@ class ModelExchangeInstance(EventInstance):
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and the events of the start."""
         super().start(t0)
-        self._discrete_states(t0)
-        self._resume()
+        self._start_events(t0)
 
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
@@ -159,7 +158,7 @@ class ModelExchangeInstance(EventInstance):
         self.model.set_time(t)
         signs = self._indicator_signs()
         if (signs != self.signs).any():  # the inputs that are new at t have led to an event
-            self._event(t)
+            self._event(t, False)
         self.steps.carry(t, h)
         self.model.get_states(self.state_address)
         self.signs[:] = self._indicator_signs()
@@ -181,11 +180,11 @@ class ModelExchangeInstance(EventInstance):
             interrupted=lambda: self.failures.interrupted,
         )
 
-    def _completed(self, t: float) -> bool:
+    def _completed(self, t: float, at_end: bool) -> bool:
         """Tell the model of a completed step; return whether that asks for an event."""
         event, end = self.fmi.attempt("complete a step", self.api.completedIntegratorStep)
         if end:
-            raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s")
+            self.failures.ask_to_end(self.name, t, at_end)
         if event or self.solver == "cvode":  # which finds state events itself
             return bool(event)
         return bool((self._indicator_signs() != self.signs).any())
@@ -200,7 +199,7 @@ class ModelExchangeInstance(EventInstance):
     def _handle_events(self, t: float, h: float) -> None:
         """Handle what happened in a step of the compiled loop, which ends at t."""
         if self.flags[1]:
-            raise SimulationError(f"{self.name} asked to end the simulation at t = {t:g} s")
+            self.failures.ask_to_end(self.name, t, True)
         signs = self._indicator_signs()
         due = float(self.event_time[0])
         timed = due <= t + SLACK * h
@@ -216,7 +215,7 @@ class ModelExchangeInstance(EventInstance):
                 stacklevel=2,
             )
         if timed or self.flags[0] or (signs != self.signs).any():
-            self._event(t)
+            self._event(t, True)
         else:
             self.signs[:] = signs
 

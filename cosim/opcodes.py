@@ -15,9 +15,9 @@ FROM_FLOAT = 6  # n floats at a -> values of type `number` at b; one that the ty
 GATHER = 7  # n floats, from the first to the second address of n pairs at a
 FMI2_VALUES = 10  # get or set `count` values at c by n references b; with d > 0 they must be finite
 FMI3_VALUES = 11
-FMI2_DO_STEP = 12
+FMI2_DO_STEP = 12  # a step that is discarded calls d
 # b: three bools "event, terminate, early return"; c: last successful time, and when the next event is
-# due; an event that is due before the end of the step, and "event" and "early return" call d
+# due; an event that is due before the end of the step, and each of the three, call d
 FMI3_DO_STEP = 13
 FMI_TIME = 14
 FMI_VECTOR = 15  # get or set the vector b of n floats (states, derivatives)
@@ -28,9 +28,6 @@ END = 19
 
 #: a time event within so many steps after a communication point is due there: room for the round-off of times
 SLACK = 1e-9
-
-#: the status that the loop adds to those of FMI: fmi3DoStep asked to end
-TERMINATED = 100
 
 
 @dataclass(frozen=True)

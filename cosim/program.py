@@ -408,7 +408,7 @@ class Program:
 
     def loop(self) -> Loop:
         """Return the loop, compiled."""
-        return Loop(self._merged(self.first), self._merged(self.second))
+        return Loop(self._merged(self.first), self._merged(self.second), self.failures.stop)
 
     def _merged(self, ops: list[Op]) -> list[Op]:
         """Join neighbouring copies of a few floats to one operation: less to look up for the loop."""
@@ -443,7 +443,7 @@ class Program:
                 what, remedy = "is above 2^53, which a float does not hold", "do not connect or record it"
             text = f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); {remedy}"
         elif isinstance(instance, FMUInstance):
-            text = instance.failure(op, status, t, self.h) + f" (step {k})"
+            text = instance.fmi.failure(status, t) + f" (step {k})"
         else:
             why = "an exception in its kernel; run with jit=False to see where"
             text = f"{op.participant} failed at t = {t:g} s (step {k}) with {why}"

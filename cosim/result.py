@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 #: what .npz keeps beside time, signals and statistics
-_SAVED = ("units", "step", "steps", "seconds", "schedule", "interrupted")
+_SAVED = ("units", "step", "steps", "seconds", "schedule", "interrupted", "ended")
 
 
 def _values(value: Any) -> Any:
@@ -55,6 +55,8 @@ class Result:
         port name -> (r,) or (r, m)
     interrupted
         True when the run was stopped before its end; what was computed is here
+    ended
+        which participant asked to end the run before its stop time, and when; "" if none did
     """
 
     time: Array
@@ -66,6 +68,7 @@ class Result:
     seconds: float = 0.0
     schedule: str = ""
     interrupted: bool = False
+    ended: str = ""
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.signals:

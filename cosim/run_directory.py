@@ -35,6 +35,7 @@ def write_run(
         "step": {"value": result.step, "unit": "s"},
         "loop": {"value": result.seconds, "unit": "s"},
         "interrupted": result.interrupted,
+        "ended": result.ended,
         "schedule": result.schedule.splitlines(),
         "versions": {name: version(name) for name in _TOOLS} | {"python": platform.python_version()},
     }

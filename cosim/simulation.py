@@ -20,6 +20,7 @@ import signal
 import tempfile
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,9 +30,17 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 
-from .errors import RecordError, SimulationError, SnapshotError, TimeError, WiringError, did_you_mean
+from .errors import (
+    RecordError,
+    SimulationEndedWarning,
+    SimulationError,
+    SnapshotError,
+    TimeError,
+    WiringError,
+    did_you_mean,
+)
 from .fmu import FMU
-from .instances import Failures
+from .instances import EndOfRun, Failures
 from .loop import Loop
 from .program import Program, steps_between
 from .result import Result, Statistics
@@ -116,6 +125,8 @@ class Simulation:
         #: the point that comes next, or, once its outputs have been evaluated, the present one
         self._k, self._acted = 0, False
         self._incomplete = self._closed = False
+        #: who asked to end the run, and when
+        self._ended = ""
         self._token = object()
         self._first = 0
         self._data: Array = np.empty((0, 0))
@@ -146,7 +157,8 @@ class Simulation:
         """Run from the present communication point to `until`, in s; both are in the result.
 
         Raises SimulationError (with `result`, what was computed) when a participant fails
-        or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C.
+        or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C. When a
+        participant asks to end the run, what was computed is returned: `Result.ended`.
         """
         check_time(self.step, self.start, until)
         last = steps_between(until - self.start, self.step, "the time from start to stop")
@@ -220,9 +232,13 @@ class Simulation:
                     self._acted = False
                     if isinstance(failures.exception, KeyboardInterrupt):
                         raise failures.exception
+                    if isinstance(failures.exception, EndOfRun):
+                        return self._end(failures.exception.text)
                     raise self._program.error(loop.rows[row], self.start, self._k, status)
-                self._acted = until > last
-                self._k = min(until, last)
+                self._k = int(loop.report[1])
+                self._acted = self._k < until  # the last point, or where a participant asked to end
+                if failures.end and self._acted:
+                    return self._end(failures.end)
                 if failures.interrupted:
                     self._incomplete = False
                     raise KeyboardInterrupt
@@ -237,6 +253,12 @@ class Simulation:
             error.result = self._result(interrupted=True)
             raise
         self._incomplete = False
+        return self._result()
+
+    def _end(self, text: str) -> Result:
+        """Return the result of a run that a participant asked to end."""
+        self._ended = text
+        warnings.warn(f"{text}; the result ends there", SimulationEndedWarning, stacklevel=4)
         return self._result()
 
     # ------------------------------------------------------------------------ snapshots
@@ -273,7 +295,7 @@ class Simulation:
         for array, kept in zip(self._program.memory, snapshot.memory, strict=True):
             array[:] = kept
         self._k, self._acted = snapshot.place
-        self._incomplete = False
+        self._incomplete, self._ended = False, ""
         self._program.failures.clear()
 
     def branch(self) -> Simulation:
@@ -308,9 +330,8 @@ class Simulation:
     def _check_usable(self, what: str) -> None:
         self._check_open(what)
         if self._incomplete:
-            raise SimulationError(
-                f"this simulation cannot {what}: it ended within a step; restore a snapshot, or start anew"
-            )
+            why = self._ended or "it ended within a step"
+            raise SimulationError(f"this simulation cannot {what}: {why}; restore a snapshot, or start anew")
 
     # ---------------------------------------------------------------------------- ends
 
@@ -336,6 +357,7 @@ class Simulation:
             seconds=time.perf_counter() - self._began,
             schedule=program.schedule(),
             interrupted=interrupted,
+            ended=self._ended,
         )
 
     def _statistics(self, n: int) -> dict[str, Statistics]:

@@ -10,12 +10,23 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from cosim import FMU, Block, Input, Output, State, System, simulate
+from cosim import (
+    FMU,
+    Block,
+    Input,
+    Output,
+    Result,
+    Simulation,
+    SimulationEndedWarning,
+    State,
+    System,
+    simulate,
+)
 from cosim.errors import FMUError, SimulationError, WiringError
 from cosim.inspection import inspection
 from fmus.export import export
 
-from .parts import Ramp
+from .parts import Counter, Mass, Ramp
 from .probe import INTEGERS, probe
 from .test_fmu import Chain, closed
 
@@ -113,10 +124,39 @@ def test_state_time_and_step_events(probes, version, options):
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("options", [SAMPLED, STAGES], ids=["Co-Simulation", "Model Exchange"])
 def test_a_request_to_end_ends_the_run(probes, version, options):
-    system = System({"p": FMU(probes[version], start={"end_at": 5 * H})})
-    with pytest.raises(SimulationError, match=r"p asked to end the simulation .*t = 1\.4") as caught:
-        simulate(system, step=H, stop=9 * H, **options)
-    assert list(caught.value.result.time) == [k * H for k in range(5)]
+    """A normal end: the communication point that the FMU came to is the last, for all participants."""
+    parts = {"a": Counter(), "p": FMU(probes[version], start={"end_at": 5 * H}), "z": Mass()}
+    with pytest.warns(SimulationEndedWarning, match=r"p asked to end the simulation at t = 1\.40625 s"):
+        result = simulate(System(parts), step=H, stop=9 * H, **options)
+    assert result.ended == "p asked to end the simulation at t = 1.40625 s"
+    assert (result.steps, result.interrupted) == (5, False)
+    assert list(result.time) == [k * H for k in range(6)]
+    whole = simulate(System({"z": Mass(), "p": FMU(probes[version])}), step=H, stop=9 * H, **options)
+    assert whole.ended == ""
+    for name in ("z.x", "p.x", "p.stair"):
+        assert list(result[name]) == list(whole[name][:6]), name
+    assert result.statistics["p.stair"].maximum == 1.0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_request_to_end_within_a_step(probes, version, tmp_path):
+    """The FMU comes to 4.5 H of the step to 5 H: the last point of the result is 4 H."""
+    fmu = FMU(probes[version], start={"early_at": 4.5 * H, "end_at": 4.7 * H})
+    with pytest.warns(SimulationEndedWarning):
+        result = simulate(System({"p": fmu}), step=H, stop=9 * H)
+    assert result.ended == "p asked to end the simulation at t = 1.265625 s"
+    assert list(result.time) == [k * H for k in range(5)]
+    result.save(tmp_path / "result.npz")
+    assert Result.load(tmp_path / "result.npz").ended == result.ended
+
+
+def test_after_a_request_to_end(probes):
+    """Nothing runs on, but what was saved before can be returned to."""
+    with Simulation(System({"r": Ramp(), "p": FMU(probes["2.0"], start={"end_at": 3 * H})}), step=H) as run:
+        with pytest.warns(SimulationEndedWarning):
+            run.run(5 * H)
+        with pytest.raises(SimulationError, match=r"cannot run: p asked to end .* restore a snapshot"):
+            run.run(6 * H)
 
 
 def test_an_early_return_is_continued(probes):
