@@ -170,12 +170,13 @@ class FMUInstance:
         """Return the address of the floats of a port."""
         return next(x.addresses[port] for x in [*self.inputs, *self.outputs] if port in x.addresses)
 
-    def read(self, fraction: float = 0.0, text: str = "outputs") -> list[Op]:
-        """Get the outputs that are used."""
+    def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
+        """Get the outputs that are used; they must be finite unless inputs are still to come."""
         ops = []
         for x in self.outputs:
             is_float64 = x.raw is x.values
-            ops.append(replace(self._values("Get", x, int(is_float64)), text=f"{self.name}: {text} (FMU)"))
+            check = int(is_float64 and final)
+            ops.append(replace(self._values("Get", x, check), text=f"{self.name}: outputs (FMU)"))
             if not is_float64:
                 ops.append(self._convert(TO_FLOAT, x, x.raw, x.values))
         return ops

@@ -208,11 +208,11 @@ class KernelInstance:
         """Run a block."""
         return [self._call("step", "step", fraction, self._outputs)]
 
-    def read(self, fraction: float = 0.0, text: str = "outputs") -> list[Op]:
-        """Evaluate derivatives and outputs."""
+    def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
+        """Evaluate derivatives and outputs; they must be finite unless inputs are still to come."""
         ops = [self._call("derivatives", "", fraction)] if "derivatives" in self._addresses else []
         if "outputs" in self._addresses:
-            ops.append(self._call("outputs", text, fraction, self._outputs))
+            ops.append(self._call("outputs", "outputs", fraction, self._outputs if final else (0, 0)))
         return ops
 
     def latch(self) -> list[Op]:

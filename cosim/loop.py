@@ -437,6 +437,7 @@ class Loop:
         self._table = np.array([op.operands() for op in self.rows], dtype=np.int64)
         integer, real, pointer = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
         kinds = (pointer, integer, integer, integer, real, real, pointer, integer, pointer)
+        self._places = [int(array.ctypes.data) for array in (self._table, self.report, self.stop)]
         self._function = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(loop_ir(first, second))("run"))
 
     def record_to(self, data: Array) -> None:
@@ -447,8 +448,7 @@ class Loop:
 
     def run(self, k: int, until: int, last: int, t0: float, h: float, resume: bool = False) -> bool:
         """Run the points k to until - 1; tell whether an operation failed."""
-        table, report = self._table.ctypes.data, self.report.ctypes.data
-        stop = self.stop.ctypes.data
+        table, report, stop = self._places
         return bool(self._function(table, k, until, last, t0, h, report, resume, stop))
 
 

@@ -352,11 +352,12 @@ class Program:
     ) -> list[Op]:
         """Return one evaluation of all outputs and blocks at a stage."""
         ops: list[Op] = []
-        for members in rounds:
+        for i, members in enumerate(rounds):
             for name, feedthrough in members.items():
                 if not self._is_block(name):
                     ops += self._with_inputs(name, delays) if feedthrough else []
-                    ops += self.instances[name].read(c)
+                    final = not any(name in later for later in rounds[i + 1 :])
+                    ops += self.instances[name].read(c, final)
                 elif self.rates[name] is None or stage == 0:
                     ops += self._block(name, delays, c, self.rates[name] or 1)
         return ops

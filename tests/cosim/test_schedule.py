@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim import Block, Input, Output, System, schedule
+from cosim import Block, Continuous, Input, Output, State, System, schedule, simulate
 from cosim.errors import WiringError
 
 from .parts import Gain, Integrator, Mass, Ramp, Through
@@ -222,3 +222,24 @@ def test_statistics_and_records_come_after_the_blocks():
         "to t_k+1:",
         "  i: advance",
     ]
+
+
+class Quotient(Continuous):
+    """x' = -x, y = x / u: no number before u is there"""
+
+    u = Input()
+    x = State(2.0)
+    y = Output()
+
+    def derivatives(self, t):
+        self.der_x = -self.x
+
+    def outputs(self, t):
+        self.y = self.x / self.u
+
+
+def test_an_output_that_waits_for_its_input_may_be_anything_until_then():
+    """x is read for the gain before u is known; 2 / (-2 x) at the start is -0.5."""
+    system = System({"q": Quotient(), "g": Gain(K=-2.0)}, [("q.x", "g.x"), ("g.u", "q.u")])
+    result = simulate(system, step=0.1, stop=0.3, coupling="continuous", record=["q.y"])
+    assert result["q.y"] == pytest.approx([-0.5] * 4)
