@@ -52,6 +52,7 @@ from fmus.tall_building import Damper, default_building, with_damper
 from fmus.tuned_mass_damper import TunedMassDamper
 from fmus.wind import FloorLoad
 from scenarios._tower_criteria import Power
+from scenarios.external_plant import Damping
 from tests.benchmark_data import BRIDGE
 
 from .test_damped_tower import small_tower
@@ -130,6 +131,7 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     _FunctionOfTime: [lambda: function_source(lambda t: 25.0 * (math.sin(t) + 1.0))],
     WeightedSum: [lambda: WeightedSum([1.0, -0.3, 7.0])],
     Power: [Power],
+    Damping: [Damping],
     # plants and their load
     Oscillator: [Oscillator],
     ShearBuilding: [
