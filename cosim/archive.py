@@ -49,12 +49,14 @@ _Returned = TypeVar("_Returned")
 
 
 class Archive:
-    """An .fmu file that is open, and its entries are sound; raises FMUError where they are not."""
+    """An .fmu or .ssp file that is open, and its entries are sound; raises FMUError where they are not."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kind: str = "FMU") -> None:
         self.path = path
+        #: what it should be, for messages: "FMU" or "SSP"
+        self.kind = kind
         if not path.is_file():
-            raise FMUError(f"there is no file {path}; give the path of an .fmu file")
+            raise FMUError(f"there is no file {path}; give the path of an .{kind.lower()} file")
         try:
             self._file = path.open("rb")
         except OSError as error:
@@ -65,7 +67,7 @@ class Archive:
                 self._zip = zipfile.ZipFile(self._file)
             except Exception as error:  # zipfile lets through what a broken archive makes it meet
                 raise FMUError(
-                    f"{path} is no FMU: it is not a ZIP archive ({str(error)[:99]}); was it copied "
+                    f"{path} is no {kind}: it is not a ZIP archive ({str(error)[:99]}); was it copied "
                     "completely?"
                 ) from error
             self._entries = self._checked()
@@ -99,10 +101,10 @@ class Archive:
             where = (
                 f"; it is in {places[0]}: pack the contents of that folder, not the folder" if places else ""
             )
-            raise FMUError(f"{self.path} is no FMU: it has no {name} at its top{where}")
+            raise FMUError(f"{self.path} is no {self.kind}: it has no {name} at its top{where}")
         entry = self._entries[name]
         if entry.file_size > MAX_XML:
-            raise FMUError(f"{self.path}: {name} of {_size(entry.file_size)} is too large; is it an FMU?")
+            raise FMUError(f"{self.path}: {name} of {_size(entry.file_size)} is too large")
         return self._attempt(name, lambda: self._zip.read(entry))
 
     def extraction(self) -> Extraction:
@@ -155,14 +157,15 @@ class Archive:
         at = len(tail) - 22 if plain else tail.rfind(b"PK\x05\x06")
         if at < 0 or len(tail) < at + 22:
             raise FMUError(
-                f"{self.path} is no FMU: it is not a ZIP archive (it has no end); was it copied completely?"
+                f"{self.path} is no {self.kind}: it is not a ZIP archive (it has no end); "
+                "was it copied completely?"
             )
         (size,) = struct.unpack_from("<I", tail, at + 12)
         if at >= 76 and tail[at - 20 : at - 16] == b"PK\x06\x07":
             (size,) = struct.unpack_from("<Q", tail, at - 36)
         if size > MAX_DIRECTORY:
             raise FMUError(
-                f"{self.path} has a directory of {_size(size)}, too many entries for an FMU "
+                f"{self.path} has a directory of {_size(size)}, too many entries for an {self.kind} "
                 f"(at most {MAX_ENTRIES:,}); where does it come from?"
             )
 
@@ -170,7 +173,9 @@ class Archive:
         """Return the files by path; refuse what must not be unpacked."""
         entries = self._zip.infolist()
         if len(entries) > MAX_ENTRIES:
-            raise FMUError(f"{self.path} has {len(entries):,} entries, which no FMU has; where is it from?")
+            raise FMUError(
+                f"{self.path} has {len(entries):,} entries, which no {self.kind} has; is it whole?"
+            )
         files: dict[str, zipfile.ZipInfo] = {}
         for entry in entries:
             fault = _fault(entry)
@@ -188,7 +193,8 @@ class Archive:
         packed = max(self._file.seek(0, os.SEEK_END), 1)
         if total > MAX_UNPACKED or (total > HARMLESS and total > MAX_RATIO * packed):
             raise FMUError(
-                f"{self.path} of {_size(packed)} unpacks to {_size(total)}, which is a ZIP bomb and no FMU"
+                f"{self.path} of {_size(packed)} unpacks to {_size(total)}, which is a ZIP bomb "
+                f"and no {self.kind}"
             )
         return files
 

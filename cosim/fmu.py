@@ -33,6 +33,7 @@ from .tableaus import TABLEAUS
 Interface = Literal["CoSimulation", "ModelExchange"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4", "cvode"]
 SOLVERS = (*TABLEAUS, "cvode")
+DEFAULT_TOLERANCE = 1e-6
 
 _ADAPTERS: dict[str, type[Adapter]] = {"2": Fmi2, "3": Fmi3}
 
@@ -94,7 +95,7 @@ class FMU:
         self.interface = interface
         self.solver = solver
         self.substeps = substeps
-        self.tolerance = 1e-6 if tolerance is None else tolerance
+        self.tolerance = DEFAULT_TOLERANCE if tolerance is None else tolerance
         self.as_block = as_block
         self.every, self.sample_period = rate(self.path.name, every, sample_period)
         with Archive(self.path) as archive:

@@ -14,10 +14,6 @@ ours tells beyond the standard.
 from __future__ import annotations
 
 import posixpath
-import shutil
-import tempfile
-import weakref
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -27,6 +23,7 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
+from .archive import Archive, Extraction
 from .errors import CosimError, WiringError, did_you_mean
 from .fmu import FMU
 from .fmu_ports import unit_of
@@ -40,6 +37,7 @@ from .ssp_format import (
     SSPError,
     Units,
     element_name,
+    flag,
     numbers,
     own_annotation,
     parse_xml,
@@ -80,35 +78,18 @@ def read_ssp(path: str | PathLike[str], *, replace: Mapping[str, Member] | None 
 
 def read_package(path: str | PathLike[str], *, replace: Mapping[str, Member] | None = None) -> Package:
     """Return the system and the default experiment of an SSP."""
-    package = Path(path)
-    if not package.is_file():
-        raise SSPError(f"there is no file {package}; give the path of an .ssp file")
-    if not zipfile.is_zipfile(package):
-        raise SSPError(f"{package} is no SSP: it is not a ZIP archive; was it copied completely?")
-    with zipfile.ZipFile(package) as archive:
-        return _Reader(package, archive, dict(replace or {})).package()
-
-
-class _Folder:
-    """A temporary folder that lives as long as the FMUs from it."""
-
-    def __init__(self) -> None:
-        self.path = Path(tempfile.mkdtemp(prefix="structcosim-ssp-"))
-        weakref.finalize(self, shutil.rmtree, str(self.path), ignore_errors=True)
+    with Archive(Path(path), "SSP") as archive:
+        return _Reader(archive, dict(replace or {})).package()
 
 
 class _Reader:
     """Reads one package."""
 
-    def __init__(self, path: Path, archive: zipfile.ZipFile, replace: dict[str, Member]) -> None:
-        self.where = path.name
+    def __init__(self, archive: Archive, replace: dict[str, Member]) -> None:
+        self.where = archive.path.name
         self.archive = archive
-        self.files = {entry.filename: entry for entry in archive.infolist()}
         self.replace = replace
-        self.folder = _Folder()
-        self.copies: dict[str, Path] = {}
-        if ROOT not in self.files:
-            raise SSPError(f"{path} is no SSP: it has no {ROOT} at its top")
+        self.extraction: Extraction | None = None
         self.root = parse_xml(self.read(ROOT, self.where), f"{self.where}/{ROOT}")
         version = self.root.get("version", "none")
         if self.root.tag != tag(SSD, "SystemStructureDescription") or version not in VERSIONS:
@@ -118,17 +99,19 @@ class _Reader:
         self.parameters = Parameters(self.structure.root, self.read, self.where)
 
     def read(self, source: str, where: str) -> bytes:
-        """Return a file of the package by the URI that names it."""
+        """Return an XML file of the package by the URI that names it."""
+        return self.archive.read(source if source == ROOT else self._name(source, where))
+
+    def _name(self, source: str, where: str) -> str:
+        """Return the name in the archive for a URI."""
         uri = urlsplit(source)
         name = posixpath.normpath(unquote(uri.path))
         if uri.scheme or uri.netloc or uri.fragment or name.startswith(("/", "..")):
             raise SSPError(f"{where}: '{source}' is outside of the package, which is not supported")
-        if name not in self.files:
-            raise SSPError(f"{where}: the package has no file '{name}'" + did_you_mean(name, self.files))
-        try:
-            return self.archive.read(self.files[name])
-        except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
-            raise SSPError(f"{where}: '{name}' cannot be read from the package: {error}") from error
+        if name not in self.archive.names:
+            hint = did_you_mean(name, self.archive.names)
+            raise SSPError(f"{where}: the package has no file '{name}'{hint}")
+        return name
 
     def package(self) -> Package:
         """Build the system."""
@@ -172,36 +155,34 @@ class _Reader:
         kind = element.xml.get("type", FMU_TYPE)
         if kind != FMU_TYPE:
             raise SSPError(f"{where} is of type {kind}, which is not supported; FMUs ({FMU_TYPE}) are")
-        if source not in self.copies:
-            data = self.read(source, where)
-            name = element_name((posixpath.basename(unquote(source)).removesuffix(".fmu"),))
-            place = self.folder.path / str(len(self.copies)) / f"{name}.fmu"
-            place.parent.mkdir()
-            place.write_bytes(data)
-            self.copies[source] = place
-        path = self.copies[source]
-        own = own_annotation(element.xml, SSD, "participant")
+        name = self._name(source, where)
+        if self.extraction is None:
+            self.extraction = self.archive.extraction()
+        path = self.extraction.folder / name
         try:
-            fmu = FMU(
-                path,
-                start=self._start_values(element, read_description(path), links),
-                substeps=_whole(own.get("substeps", "1"), where),
-                as_block=own.get("kind") == "block",
-                every=_whole(own["every"], where) if "every" in own else None,
-                sample_period=numbers(own["samplePeriod"], where)[0] if "samplePeriod" in own else None,
-            )
+            start = self._start_values(element, read_description(path), links)
+            fmu = FMU(path, start=start, **self._options(element, where))
         except CosimError as error:
             raise type(error)(f"{where}: {error}") from error
-        self._choose_interface(fmu, element.xml.get("implementation", "any"), where)
-        fmu.kept = self.folder
+        fmu.kept = self.extraction
         return fmu
 
-    def _choose_interface(self, fmu: FMU, wanted: str, where: str) -> None:
-        has = {"any": True, "CoSimulation": fmu.has_cs, "ModelExchange": fmu.has_me}
-        if not has.get(wanted, False):
-            raise SSPError(f"{where} is to run as {wanted}; {fmu} cannot")
-        fmu.has_cs &= wanted != "ModelExchange"
-        fmu.has_me &= wanted != "CoSimulation"
+    def _options(self, element: Element, where: str) -> dict[str, Any]:
+        """Return the keywords of an FMU that the element and our annotation give."""
+        own = own_annotation(element.xml, SSD, "participant")
+        options: dict[str, Any] = {"as_block": own.get("kind") == "block"}
+        interface = element.xml.get("implementation", "any")
+        if interface != "any":
+            options["interface"] = interface
+        if "solver" in own:
+            options["solver"] = own["solver"]
+        if "eventMode" in own:
+            options["event_mode"] = flag(own["eventMode"])
+        options |= {n: _whole(own[n], where) for n in ("substeps", "every") if n in own}
+        for name, attribute in (("tolerance", "tolerance"), ("sample_period", "samplePeriod")):
+            if attribute in own:
+                options[name] = numbers(own[attribute], where)[0]
+        return options
 
     def _start_values(self, element: Element, description: Any, links: list[Link]) -> dict[str, Any]:
         self.units.add_fmu(description)

@@ -3,7 +3,8 @@
 SSP does not say when a component acts, nor with which step a system is run. That is in
 annotations of our own, which other tools skip (SSP 1.0, 4.2: unknown types are ignored):
 
-    on a component     <participant kind="block" every="2" samplePeriod="0.01" substeps="4"/>
+    on a component     <participant kind="block" every="2" samplePeriod="0.01"/>
+                       <participant solver="cvode" tolerance="1e-8" substeps="4" eventMode="true"/>
     on a connection    <delay initial="0.5 1.0"/>             one communication step late
     on the experiment  <experiment step="0.01" coupling="sampled" solver="ode3"/>
 """

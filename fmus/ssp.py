@@ -31,7 +31,7 @@ from lxml import etree
 from cosim.errors import CosimError
 from cosim.fmi2 import Fmi2
 from cosim.fmi3 import Fmi3
-from cosim.fmu import FMU
+from cosim.fmu import DEFAULT_TOLERANCE, FMU
 from cosim.fmu_ports import FMUPort, Shape, ports, unit_of
 from cosim.model_description import read_description
 from cosim.participant import Block
@@ -204,8 +204,8 @@ class _Writer:
     def _component(self, elements: etree._Element, part: _Part) -> None:
         member = part.member
         component = _add(elements, SSD, "Component", name=part.name, type=FMU_TYPE, source=part.source)
-        if isinstance(member, FMU) and not (member.has_cs and member.has_me):
-            component.set("implementation", "CoSimulation" if member.has_cs else "ModelExchange")
+        if isinstance(member, FMU) and member.interface is not None:
+            component.set("implementation", member.interface)
         connectors = self._connectors(part)
         section = _add(component, SSD, "Connectors") if connectors else None
         for name, (port, kind) in connectors.items():
@@ -377,8 +377,11 @@ def _facts(member: Member) -> dict[str, str]:
             facts["every"] = str(member.every)
         if member.sample_period is not None:
             facts["samplePeriod"] = repr(member.sample_period)
-    if isinstance(member, FMU) and member.substeps != 1:
-        facts["substeps"] = str(member.substeps)
+    if isinstance(member, FMU):
+        facts |= {} if member.solver is None else {"solver": member.solver}
+        facts |= {} if member.substeps == 1 else {"substeps": str(member.substeps)}
+        facts |= {} if member.tolerance == DEFAULT_TOLERANCE else {"tolerance": repr(member.tolerance)}
+        facts |= {"eventMode": "true"} if member.event_mode else {}
     return facts
 
 

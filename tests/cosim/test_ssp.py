@@ -263,8 +263,8 @@ def test_the_experiment_and_the_interface(package):
     ends = '<ssd:DefaultExperiment startTime="1" stopTime="3"/>'
     found = read_package(package(system(chosen), ends))
     assert (found.experiment.start, found.experiment.stop, found.experiment.step) == (1.0, 3.0, None)
-    assert (found.system.participants["s"].has_me, found.system.participants["s"].has_cs) == (True, False)
-    with pytest.raises(CosimError, match=r"component g is to run as ModelExchange; FMU\(Gain\.fmu"):
+    assert found.system.participants["s"].interface == "ModelExchange"
+    with pytest.raises(CosimError, match=r'component g: Gain\.fmu: interface="ModelExchange" is not there'):
         read_ssp(package(system(component("g", "Gain", GAIN, implementation="ModelExchange"))))
 
 
@@ -353,6 +353,14 @@ def test_files_that_are_no_ssp(package, tmp_path):
         read_ssp(package(system(TWO), version="3.0", valid=False))
     with pytest.raises(CosimError, match=r"SystemStructure\.ssd is broken XML"):
         read_ssp(package("<ssd:System", valid=False))
+
+
+def test_an_archive_that_leads_outside_is_refused(tmp_path):
+    with zipfile.ZipFile(tmp_path / "slip.ssp", "w") as archive:
+        archive.writestr("../evil.fmu", "")
+        archive.writestr("SystemStructure.ssd", "")
+    with pytest.raises(CosimError, match=r"'\.\./evil\.fmu' in it leads out of the folder"):
+        read_ssp(tmp_path / "slip.ssp")
 
 
 def test_entities_are_not_expanded(tmp_path):
