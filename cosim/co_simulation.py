@@ -12,6 +12,7 @@ import ctypes
 from dataclasses import replace
 from typing import Any
 
+from .clocks import Timers
 from .errors import FMUError, SimulationError
 from .fmi import StepAnswer
 from .fmu import FMU
@@ -25,8 +26,9 @@ _DISCARD = 2
 class CoSimulationInstance(EventInstance):
     """One instance of an FMU in a run, with Co-Simulation."""
 
-    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
+    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str], h: float) -> None:
         super().__init__(name, fmu, failures, used)
+        self._timers = Timers(self.fmi, fmu.clocks.values(), h)
         self.event_mode = fmu.event_mode
         self.step_callback: Any = None
         if self.fmi.answer is not None:
@@ -37,6 +39,12 @@ class CoSimulationInstance(EventInstance):
         super().start(t0)
         if self.event_mode:
             self._start_events(t0)
+
+    def _settle(self, t0: float) -> None:
+        self._timers.start(t0, self.intervals)
+
+    def _due(self, t: float) -> list[int]:
+        return self._timers.due(t)
 
     def step(self, fraction: float = 0.0) -> list[Op]:
         """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""

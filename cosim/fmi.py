@@ -119,8 +119,10 @@ class Adapter(ABC):
         """Set structural parameters; right after the instance is made."""
 
     @abstractmethod
-    def initialize(self, t0: float, set_start: Callable[[], None]) -> None:
-        """Go through initialization; start values are set where they have to be."""
+    def initialize(
+        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
+    ) -> None:
+        """Go through initialization; start values are set where they have to be, `settle` called inside."""
 
     @abstractmethod
     def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:

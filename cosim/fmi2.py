@@ -60,11 +60,14 @@ class Fmi2(Adapter):
     def configure(self, values: Mapping[str, Sequence[Any]]) -> None:
         """There are no structural parameters."""
 
-    def initialize(self, t0: float, set_start: Callable[[], None]) -> None:
+    def initialize(
+        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
+    ) -> None:
         """Set up the experiment, set start values, initialize."""
         self.attempt("set up the experiment", lambda: self.api.setupExperiment(startTime=t0))
         set_start()
         self.attempt("enter initialization", self.api.enterInitializationMode)
+        settle()
         self.attempt("exit initialization", self.api.exitInitializationMode)
 
     def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:

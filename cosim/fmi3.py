@@ -23,6 +23,7 @@ class Fmi3(Adapter):
         **{name: (name, number) for name, number in NUMBERS.items()},
         "Enumeration": ("Int64", NUMBERS["Int64"]),
         "Boolean": ("Boolean", Number("i8", "uint8", 0, 1)),
+        "Clock": ("Clock", NUMBERS["Float64"]),  # as a port; its start value is an interval
     }
     DERIVATIVES = "fmi3GetContinuousStateDerivatives"
     VALUES, DO_STEP, COMPLETED = FMI3_VALUES, FMI3_DO_STEP, FMI3_COMPLETED
@@ -80,10 +81,13 @@ class Fmi3(Adapter):
             self.set(self.fmu.variables[name], value)
         self.attempt("exit configuration mode", lambda: self.api.fmi3ExitConfigurationMode(component))
 
-    def initialize(self, t0: float, set_start: Callable[[], None]) -> None:
+    def initialize(
+        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
+    ) -> None:
         """Set start values, initialize from t0."""
         set_start()
         self.attempt("enter initialization", lambda: self.api.enterInitializationMode(startTime=t0))
+        settle()
         self.attempt("exit initialization", self.api.exitInitializationMode)
 
     def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:

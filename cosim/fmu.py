@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from .archive import Archive
+from .clocks import clocks_of
 from .errors import FMUError, did_you_mean
 from .fmi import Adapter
 from .fmi2 import Fmi2
@@ -110,7 +111,15 @@ class FMU:
         self.directory = self._extraction.folder
         self.event_mode = self._event_mode(event_mode)
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
+        #: the clocks of FMI 3.0
+        self.clocks = clocks_of(self.path.name, self.variables.values(), self.start)
+        if self.clocks and self.model_exchange:
+            raise FMUError(
+                f"{self.path.name} has clocks, which are supported with Co-Simulation, and Model Exchange is "
+                "used" + ("; leave interface= away" if self.has_cs else "; export it with Co-Simulation")
+            )
         numeric = [v for v in self.variables.values() if v.type in self.adapter.NUMBERS]
+        numeric = [v for v in numeric if v.type != "Clock" or self.clocks[v.name].is_port]
         self.output_ports = self._ports(v for v in numeric if v.causality in ("output", "local"))
         self.input_ports = self._ports(v for v in numeric if v.causality == "input" and v.alias is None)
         #: other names of inputs (FMI 3.0)

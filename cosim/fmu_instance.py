@@ -20,25 +20,32 @@ from .opcodes import FROM_FLOAT, TO_FLOAT, Number, Op
 
 
 class Exchange:
-    """The ports of one FMI type and variability: value references, and a buffer of floats."""
+    """The ports of one FMI type, variability and clock: value references, and a buffer of floats."""
 
-    def __init__(self, access: str, number: Number, discrete: bool, ports: list[FMUPort]) -> None:
+    def __init__(
+        self, access: str, number: Number, discrete: bool, clocks: frozenset[int], ports: list[FMUPort]
+    ) -> None:
         self.access = access
         #: can change at events only, where there are events
         self.discrete = discrete
+        #: references of the clocks at whose ticks alone it can be got and set
+        self.clocks = clocks
+        self.is_clock = access == "Clock"
         self.number = number
         self.references = np.array([v.valueReference for p in ports for v in p.variables], dtype=np.uint32)
         self.elements = [e for p in ports for e in p.elements()]
         self.values = buffer(len(self.elements))
         #: what the FMU reads and writes; the floats themselves if it does so in Float64
         self.raw = self.values if number.dtype == "float64" else np.zeros(len(self.elements), number.dtype)
-        #: what the FMU was told last, of discrete inputs
+        #: what the FMU was told last, of discrete inputs; of output clocks whether they have ticked
         self.told = self.raw.copy()
         self.addresses: dict[str, int] = {}
         offset = int(self.values.ctypes.data)
         for p in ports:
             self.addresses[p.name] = offset
             offset += 8 * p.size
+        if clocks:  # what it has until the clock ticks
+            self.values[:] = [x for p in ports for x in p.start_values()]
 
 
 class FMUInstance:
@@ -58,7 +65,9 @@ class FMUInstance:
         given = fmu.start_values()
         structural = {n for n in given if fmu.variables[n].causality == "structuralParameter"}
         #: the start values that were given, by variable
-        self.start_values = {n: v for n, v in given.items() if n not in structural}
+        self.start_values = {n: v for n, v in given.items() if n not in structural | fmu.clocks.keys()}
+        #: the intervals of clocks that were given
+        self.intervals = {n: v for n, v in given.items() if n in fmu.clocks}
         self.fmi = fmu.adapter(fmu, name, self.model_exchange)
         self.api = self.fmi.api
         try:
@@ -71,22 +80,29 @@ class FMUInstance:
         self.has_outputs = bool(self.outputs)
 
     def _exchanges(self, ports: dict[str, FMUPort]) -> list[Exchange]:
-        groups: dict[tuple[str, Number, bool], list[FMUPort]] = {}
+        groups: dict[tuple[str, Number, bool, frozenset[int]], list[FMUPort]] = {}
         for port in ports.values():
             discrete = any(v.variability != "continuous" for v in port.variables)
+            clocks = frozenset(c.valueReference for v in port.variables for c in v.clocks or ())
             access, number = self.fmi.NUMBERS[port.type]
-            groups.setdefault((access, number, discrete), []).append(port)
+            if access == "Clock":  # one that is bound to another one is got and set as any
+                clocks = frozenset()
+            groups.setdefault((access, number, discrete, clocks), []).append(port)
         return [Exchange(*kind, members) for kind, members in groups.items()]
 
     # ------------------------------------------------------------- life of an instance
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization, with the start values that were given."""
-        self.fmi.initialize(t0, self._set_start)
+        self.fmi.initialize(t0, self._set_start, lambda: self._settle(t0))
         self.running = True
         for x in self.inputs:
-            x.values[:] = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
-            x.told[:] = x.values
+            if not (x.is_clock or x.clocks):
+                x.values[:] = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
+                x.told[:] = x.values
+
+    def _settle(self, t0: float) -> None:
+        """Do what is left to initialization mode."""
 
     def _set_start(self) -> None:
         for name, values in self.start_values.items():
@@ -172,14 +188,12 @@ class FMUInstance:
 
     def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
         """Get the outputs that are used; they must be finite unless inputs are still to come."""
-        ops = []
-        for x in self.outputs:
-            is_float64 = x.raw is x.values
-            check = int(is_float64 and final)
-            ops.append(replace(self._values("Get", x, check), text=f"{self.name}: outputs (FMU)"))
-            if not is_float64:
-                ops.append(self._convert(TO_FLOAT, x, x.raw, x.values))
-        return ops
+        return [op for x in self.outputs for op in self._get_outputs(x, final)]
+
+    def _get_outputs(self, x: Exchange, final: bool) -> list[Op]:
+        is_float64 = x.raw is x.values
+        got = replace(self._values("Get", x, int(is_float64 and final)), text=f"{self.name}: outputs (FMU)")
+        return [got] if is_float64 else [got, self._convert(TO_FLOAT, x, x.raw, x.values)]
 
     def _values(self, what: str, x: Exchange, check: int = 0) -> Op:
         return Op(

@@ -22,6 +22,9 @@ Shape: TypeAlias = tuple[int, ...]
 MAX_ELEMENTS = 10_000_000
 
 
+_NUMBERS = {"true": 1.0, "false": 0.0}
+
+
 @dataclass(frozen=True)
 class FMUPort:
     """A port of an FMU: the variables that are its elements, in order, or one array variable."""
@@ -36,6 +39,15 @@ class FMUPort:
     def size(self) -> int:
         """The number of values."""
         return math.prod(self.shape)
+
+    def start_values(self) -> list[float]:
+        """Return the start values of the model description, 0 where there are none."""
+        found: list[float] = []
+        for v in self.variables:
+            given = [_NUMBERS.get(text, text) for text in (v.start or "0").split()]
+            size = self.size // len(self.variables)
+            found += [float(x) for x in (given if len(given) == size else given[:1] * size)]
+        return found
 
     def elements(self) -> list[str]:
         """Return the name of every value."""

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from .program import Program, steps_between
+from .program import Program
 from .result import Result
 from .simulation import Coupling, Simulation, Solver, check_choices, check_time
 from .system import System
+from .time_grid import steps_between
 
 
 def simulate(

@@ -18,6 +18,13 @@ from .archive import Archive
 from .errors import FMUError
 
 _LISTS = ("dependencies", "dependenciesKind", "clocks")
+_CLOCK = {
+    "intervalDecimal": float,
+    "shiftDecimal": float,
+    "resolution": int,
+    "intervalCounter": int,
+    "shiftCounter": int,
+}
 
 
 def read_description(path: Path) -> Any:
@@ -81,7 +88,25 @@ def _validated(archive: Archive, root: Any) -> Any:
         reason = str(error) if type(error) is Exception else f"it makes no sense to FMPy ({error!r})"
         raise FMUError(f"{path} has an invalid modelDescription.xml: {reason[:400]}") from error
     _check_structure(archive, root, description)
+    _complete(root, description)
     return description
+
+
+def _complete(root: Any, description: Any) -> None:
+    """Read what FMPy's object has a place for and FMPy does not read."""
+    elements: dict[str, Any] = {}
+    for element in root.iterfind("ModelVariables/*"):
+        names = [element.get("name"), *(alias.get("name") for alias in element.iterfind("Alias"))]
+        elements.update((name, element) for name in names)
+    for variable in description.modelVariables:
+        element = elements[variable.name]
+        inner = next(iter(element.iterchildren("Real")), element)  # of FMI 2.0
+        if inner.get("relativeQuantity") is not None:
+            variable.relativeQuantity = inner.get("relativeQuantity") in ("true", "1")
+        if variable.type == "Clock":
+            for name, kind in _CLOCK.items():
+                if name in element.attrib:
+                    setattr(variable, name, kind(element.get(name)))
 
 
 def _check_structure(archive: Archive, root: Any, description: Any) -> None:

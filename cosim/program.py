@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from .co_simulation import CoSimulationInstance
-from .errors import SimulationError, TimeError, WiringError
+from .errors import SimulationError, WiringError
 from .fmu import FMU
 from .fmu_instance import FMUInstance
 from .instances import Failures, KernelInstance, buffer
@@ -44,28 +44,13 @@ from .opcodes import (
 from .participant import Block, Continuous
 from .system import Connection, Port, System, cycle_text, is_block
 from .tableaus import TABLEAUS
+from .time_grid import steps_between
 from .variables import Array
 
 Table: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 Instance: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInstance
 #: what stage coupling integrates
 Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
-
-
-def steps_between(period: float, h: float, what: str) -> int:
-    """Return period / h, a whole number of steps; another ratio is refused."""
-    ratio = period / h
-    if not ratio < 2**53:
-        raise TimeError(f"{what} of {period:g} s is {ratio:g} steps of {h:g} s, more than can be counted")
-    steps = round(ratio)
-    # room for the round-off of decimal numbers, and never for more than a millionth of a step
-    if steps < 1 or abs(ratio - steps) > min(1e-9 * steps, 1e-6):
-        near = period / max(round(ratio + 0.5), 1)
-        raise TimeError(
-            f"{what} of {period:g} s is {ratio:.6g} communication steps of {h:g} s; "
-            f"it must be a whole number of them: choose a step such as {near:.6g} s"
-        )
-    return steps
 
 
 class Program:
@@ -135,8 +120,10 @@ class Program:
             self._check_stage(name, member)
         model_exchange = (stage and not member.as_block) or member.model_exchange
         self._check_alone(name, member, model_exchange)
-        kind = ModelExchangeInstance if model_exchange else CoSimulationInstance
-        return kind(name, member, self.failures, used)
+        if model_exchange:
+            return ModelExchangeInstance(name, member, self.failures, used)
+        step = self.h * ((self._rate(name) or 1) if member.as_block else 1)
+        return CoSimulationInstance(name, member, self.failures, used, step)
 
     def _check_stage(self, name: str, fmu: FMU) -> None:
         where = f"{name} ({fmu.path.name})"
@@ -144,6 +131,11 @@ class Program:
             raise WiringError(
                 f"{where} has no Model Exchange, which stage coupling needs; "
                 'use coupling="sampled" or export it with Model Exchange'
+            )
+        if fmu.clocks:
+            raise WiringError(
+                f"{where} has clocks, which tick at communication points, and stage coupling has stages "
+                'between them; use coupling="sampled"'
             )
         if fmu.interface == "CoSimulation":
             raise WiringError(

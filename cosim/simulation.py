@@ -42,10 +42,11 @@ from .errors import (
 from .fmu import FMU
 from .instances import EndOfRun, Failures
 from .loop import Loop
-from .program import Program, steps_between
+from .program import Program
 from .result import Result, Statistics
 from .system import Port, System, inputs_of, outputs_of
 from .tableaus import TABLEAUS
+from .time_grid import steps_between
 from .variables import Array
 
 Coupling = Literal["sampled", "iterated", "continuous"]

@@ -100,7 +100,6 @@ static double next_beat(const struct metronome *p) {
 static void wrap(struct metronome *p) {
     p->v[X] -= 1.0;
     p->v[WRAPS] += 1.0;
-    p->v[WRAPPED_AT] = p->time;
 }
 
 EXPORT fmi3Status fmi3EnterEventMode(P) {
@@ -168,6 +167,7 @@ static fmi3Status may_get(struct metronome *p, unsigned vr) {
 static fmi3Status may_set(struct metronome *p, unsigned vr) {
     bool discrete = vr == RATE || vr == WORD || vr == DATA || clock_of(vr);
     if (p->event_mode && discrete && p->mode == STEP) return fail(p, "variable %u set in step mode", vr);
+    if (p->mode == INSTANTIATED) return fmi3OK;
     if (clock_of(vr) && !p->active[clock_of(vr)]) return fail(p, "variable %u set, its clock is not active", vr);
     return fmi3OK;
 }
@@ -176,7 +176,8 @@ static fmi3Status may_set(struct metronome *p, unsigned vr) {
     EXPORT fmi3Status fmi3Get##name(P, const unsigned vr[], size_t n, type values[], size_t n_values) {      \
         for (size_t i = 0; i < n; i++) {                                                                     \
             if (may_get(p, vr[i])) return fmi3Error;                                                         \
-            values[i] = (type)(p->v[vr[i]] + (vr[i] == KICKED ? p->v[KICK_BY] : 0.0));                       \
+            values[i] = (type)(vr[i] == WRAPPED_AT ? p->time                                                 \
+                               : p->v[vr[i]] + (vr[i] == KICKED ? p->v[KICK_BY] : 0.0));                     \
         }                                                                                                    \
         return fmi3OK;                                                                                       \
     }                                                                                                        \
