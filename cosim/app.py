@@ -13,13 +13,14 @@ import json
 import math
 import sys
 import typing
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
-from .errors import CosimError
+from .errors import CosimError, SimulationEndedWarning
 from .result import Result
 from .scenario import Scenario, load_scenario, scenario_names
 
@@ -91,7 +92,7 @@ def list_scenarios() -> None:
 
 @_app.command
 def run(scenario: str) -> None:
-    """Run a scenario, or a file of yours like one; `cosim run NAME --help` lists its options."""
+    """Run a scenario, a file of yours like one, or an FMU; `cosim run NAME --help` lists its options."""
 
 
 @_app.command
@@ -107,9 +108,11 @@ def _run_command(scenario: Scenario) -> Callable[..., None]:
         from .run_directory import write_run
 
         directory = out or Path("out") / scenario.name
-        result = _with_progress(
-            scenario.run, options, lambda part: write_run(directory, scenario, options, part)
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SimulationEndedWarning)  # it is among the lines
+            result = _with_progress(
+                scenario.run, options, lambda part: write_run(directory, scenario, options, part)
+            )
         for line in write_run(directory, scenario, options, result, figures=figures):
             print(line)
 

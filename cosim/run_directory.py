@@ -47,6 +47,7 @@ def write_run(
     drawn = f", {len(names)} figures" if names else ""
     return [
         *lines,
+        *([result.ended] if result.ended else []),
         f"{result.steps} steps in {result.seconds:.3g} s; {directory}: metrics.json, result.npz{drawn}",
     ]
 

@@ -112,7 +112,11 @@ def _cell(value: Any) -> str:
 
 
 def load_scenario(name: str) -> Scenario:
-    """Load a scenario by its name, or a user's file by its path."""
+    """Load a scenario by its name, or a user's Python file or FMU by its path."""
+    if name.endswith(".fmu"):
+        from .fmu_scenario import fmu_scenario
+
+        return fmu_scenario(Path(name))
     if name.endswith(".py"):
         path = Path(name)
         if not path.is_file():

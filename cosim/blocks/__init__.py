@@ -8,6 +8,7 @@ from .noise import MeasurementNoise
 from .sensor import SensorDynamics, StateSpace, StrictlyProper, transfer_function
 from .sources import Constant, RecordSource, WhiteNoise, function_source
 from .sum import WeightedSum
+from .table_source import TableSource
 
 __all__ = [
     "AnalogToDigital",
@@ -22,6 +23,7 @@ __all__ = [
     "SensorDynamics",
     "StateSpace",
     "StrictlyProper",
+    "TableSource",
     "WeightedSum",
     "WhiteNoise",
     "function_source",

@@ -1,0 +1,187 @@
+"""A single FMU from the command line: times, start values, inputs from CSV files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import FMU, Result, System, simulate
+from cosim.app import main
+from cosim.blocks import TableSource
+from cosim.errors import DeclarationError, RecordError
+from cosim.fmu_scenario import fmu_scenario
+from cosim.input_table import connect_inputs
+from fmus.description import DefaultExperiment
+from fmus.export import export
+
+from .ball import ball
+from .probe import probe
+from .test_fmu import Chain
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Chain (two forces, both interfaces, a default experiment), the ball, the probe."""
+    place = tmp_path_factory.mktemp("run")
+    export(Chain(), place / "chain.fmu", experiment=DefaultExperiment(stop=1.0, step=0.1))
+    ball(place / "ball.fmu")
+    probe(place / "probe.fmu", "3.0")
+    return place
+
+
+# ------------------------------------------------------------------------------- tables
+
+
+def test_a_table_between_its_rows_at_its_rows_and_outside():
+    """0.1 k is below 0.3 and 0.7 in floats at some k; a row there counts all the same."""
+    t = [0.25, 0.3, 0.7, 0.7, 1.05]
+    rows = np.array([[1.0, 5.0], [2.0, 4.0], [3.0, 3.0], [-1.0, 2.0], [0.4, 1.0]])
+    parts = {
+        "linear": TableSource(t, rows, unit="N"),
+        "held": TableSource(t, rows, interpolation="hold"),
+    }
+    result = simulate(System(parts), step=0.1, stop=1.3)
+    k = np.arange(14)
+    assert result.units["linear.y"] == "N"
+    for i in range(2):
+        before = np.interp(0.1 * k, t[:3], rows[:3, i])
+        after = np.interp(0.1 * k, t[3:], rows[3:, i])
+        assert result["linear.y"][:, i] == pytest.approx(np.where(k < 7, before, after), abs=1e-14)
+        row = [0, 0, 0, 1, 1, 1, 1, 3, 3, 3, 3, 4, 4, 4]
+        assert list(result["held.y"][:, i]) == list(rows[row, i])
+
+
+@pytest.mark.parametrize(
+    ("instants", "rows", "words"),
+    [([0.0, 1.0], [1.0], "do not fit"), ([1.0, 0.0], [1.0, 2.0], "do not decrease"), ([], [], "at least 1")],
+)
+def test_tables_that_are_none(instants, rows, words):
+    with pytest.raises(DeclarationError, match=words):
+        TableSource(instants, rows)
+    with pytest.raises(DeclarationError, match="did you mean 'linear'"):
+        TableSource([0.0], [1.0], interpolation="liner")
+
+
+# -------------------------------------------------------------------------------- inputs
+
+
+def test_inputs_from_a_file_are_those_of_a_source(folder, tmp_path):
+    """An element and an array: the run of the same table as a block, bit for bit."""
+    (tmp_path / "in.csv").write_text('time,"u[2]"\n0,0\n0.45,1.5\n0.45,-1\n\n0.9,0.5\n')
+    options = {"stop": 1.0, "step": 0.05, "record": ("a", "u")}
+    found = fmu_scenario(folder / "chain.fmu").run(input=tmp_path / "in.csv", **options)
+    source = TableSource([0.0, 0.45, 0.45, 0.9], [0.0, 1.5, -1.0, 0.5])
+    system = System({"chain": FMU(folder / "chain.fmu"), "s": source}, [("s.y", "chain.u[2]")])
+    wanted = simulate(system, step=0.05, stop=1.0, record=["chain.a", "chain.u"])
+    for name in ("chain.a", "chain.u"):
+        assert np.array_equal(found[name], wanted[name])
+    assert np.ptp(found["chain.u"][:, 1]) > 2.0
+    (tmp_path / "array.csv").write_text("time, u\n0, 0 0\n0.45, 0 1.5\n0.45, 0 -1\n0.9, 0 0.5\n")
+    again = fmu_scenario(folder / "chain.fmu").run(input=tmp_path / "array.csv", **options)
+    assert np.array_equal(found["chain.a"], again["chain.a"])
+
+
+def test_discrete_inputs_are_held(folder, tmp_path):
+    """Booleans by word, enumerations by number, an alias by its other name."""
+    text = "time,b_in,e_in,i_in,r_other\n0,true,1,-5,0\n0.5,FALSE,2,7,1\n"
+    (tmp_path / "in.csv").write_text(text)
+    scenario = fmu_scenario(folder / "probe.fmu")
+    record = ("b_out", "e_out", "i_out", "r_out")
+    result = scenario.run(input=tmp_path / "in.csv", stop=1.0, step=0.25, record=record)
+    late = [0, 0, 0, 1, 1]  # row of the file that is latched at t_k-1, with which y_k is computed
+    for name, values in (("b_out", (0, 1)), ("e_out", (1, 2)), ("i_out", (-4, 8))):
+        assert list(result[f"probe.{name}"][1:]) == [values[row] for row in late[1:]], name
+    assert list(result["probe.r_out"][1:]) == [0.0, 1.0, 2.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "give a header, time and names of inputs"),
+        ("time,u\n", "and at least one row"),
+        ("u,time\n0,1\n", "the first column is 'u'; it must be time"),
+        ("time,w\n0,1\n", r"chain\.fmu has no input 'w'"),
+        ("time,x\n0,1\n", r"chain\.fmu has no input 'x'"),
+        ('time,"u[3]"\n0,1\n', r"outside shape \(2,\)"),
+        ("time,u\n0,1 2\n1\n", r"in\.csv:3: 1 cells, and the header has 2"),
+        ("time,u\n0,1 2\n1,1\n", r"in\.csv:3: u takes 2 numbers"),
+        ("time,u\n0,1 x\n", r"in\.csv:2: u is 'x', which is no finite number"),
+        ("time,u\n0,1 nan\n", "which is no finite number"),
+        ("time,u\n1,1 1\n0,1 1\n", r"in\.csv:3: time 0 s comes after 1 s"),
+        ("time,u,u\n0,1 1,1 1\n", "there are two columns u"),
+        ('time,"u\n0,1 1\n', "is no CSV file"),
+    ],
+)
+def test_files_that_are_no_inputs(folder, tmp_path, text, words):
+    (tmp_path / "in.csv").write_text(text)
+    with pytest.raises(Exception, match=words) as caught:
+        connect_inputs(System({"chain": FMU(folder / "chain.fmu")}), "chain", tmp_path / "in.csv")
+    assert type(caught.value).__module__ == "cosim.errors"
+
+
+def test_a_missing_or_binary_file_and_a_text_input(folder, tmp_path):
+    system = System({"p": FMU(folder / "probe.fmu")})
+    with pytest.raises(RecordError, match="cannot be read"):
+        connect_inputs(system, "p", tmp_path / "missing.csv")
+    (tmp_path / "in.csv").write_bytes(bytes(range(128, 200)))
+    with pytest.raises(RecordError, match="no text in UTF-8"):
+        connect_inputs(system, "p", tmp_path / "in.csv")
+
+
+# -------------------------------------------------------------------------- command line
+
+
+def test_the_command_writes_what_it_finds(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    main(
+        [
+            "run",
+            str(folder / "chain.fmu"),
+            "--interface",
+            "ModelExchange",
+            "--solver",
+            "ode2",
+            "--start",
+            "k=5",
+        ]
+    )
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1].startswith("10 steps in ")
+    assert "peak chain.a[2]" in lines[1]
+    kept = json.loads(Path("out/chain/metrics.json").read_text())
+    fmu = FMU(folder / "chain.fmu", interface="ModelExchange", solver="ode2", start={"k": 5.0})
+    wanted = simulate(System({"chain": fmu}), step=0.1, stop=1.0, record=["chain.a"])
+    assert kept["metrics"]["peak chain.a[1]"]["value"] == np.abs(wanted["chain.a"][:, 0]).max()
+    assert np.array_equal(Result.load("out/chain/result.npz")["chain.a"], wanted["chain.a"])
+
+
+def test_an_end_that_the_fmu_asks_for_is_told(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    ends = ["--start", "end_at_bounce=2", "--stop", "9", "--step", "0.5"]
+    main(["run", str(folder / "ball.fmu"), *ends])
+    out = capsys.readouterr()
+    assert "ball asked to end the simulation at t = 2.82" in out.out
+    assert out.err == ""
+    assert json.loads(Path("out/ball/metrics.json").read_text())["ended"].startswith("ball asked")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "ball.fmu has no default stop time; give --stop"),
+        (["--stop", "2"], "ball.fmu has no default step; give --step, in s, such as 0.002"),
+        (["--stop", "2", "--step", "0.1", "--start", "ee=1"], "no variable 'ee'; did you mean 'e'"),
+        (["--stop", "2", "--step", "0.1", "--start", "e"], "write name=value"),
+        (["--stop", "2", "--step", "0.1", "--start", "e=soft"], "'soft' is no value of type Real"),
+        (["--stop", "2", "--step", "0.1", "--record", "hh"], "did you mean 'h'"),
+    ],
+)
+def test_what_is_wrong_on_the_command_line(folder, tmp_path, monkeypatch, capsys, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as caught:
+        main(["run", str(folder / "ball.fmu"), *arguments])
+    assert caught.value.code == 2
+    assert words in capsys.readouterr().err
