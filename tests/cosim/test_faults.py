@@ -188,6 +188,7 @@ SIGNAL = """
         def step(self, t, h):
             self.n += 1.0
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
     simulate(System({{"c": Counter()}}), step=1.0, stop=10.0)  # compile first
     threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     began = time.perf_counter()
