@@ -22,7 +22,8 @@ from cyclopts import App, CycloptsError, Parameter
 
 from .errors import CosimError, SimulationEndedWarning
 from .result import Result
-from .scenario import Scenario, load_scenario, scenario_names
+from .scenario import Scenario, ScenarioError, load_scenario, scenario_names
+from .system import System
 
 _app = App(
     name="cosim", help="Co-simulation of vibration-controlled structures.", result_action="return_value"
@@ -167,34 +168,75 @@ def _with_progress(
 
 @_app.command
 def export(
-    participant: str,
+    what: str,
     *,
     out: Path | None = None,
     platform: tuple[str, ...] = (),
-    fmi_version: str = "2.0",
+    fmi_version: str | None = None,
+    ssp_version: str | None = None,
+    step: float | None = None,
+    stop: float | None = None,
 ) -> None:
-    """Export a participant of a scenario as a native FMU.
+    """Export a participant of a scenario as a native FMU, or the whole system as an SSP.
 
     Parameters
     ----------
-    participant
-        scenario:participant, such as chattering:plant or my_scenario.py:controller
+    what
+        scenario:participant, such as chattering:plant or my_scenario.py:controller; a scenario
+        alone is the system
     out
-        the file to write [PARTICIPANT.fmu]
+        the file to write [PARTICIPANT.fmu, SCENARIO.ssp]
     platform
         x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, aarch64-darwin; may be repeated
         [this machine]
     fmi_version
-        2.0, or 3.0, in which arrays are arrays
+        of FMUs that are made: 2.0, or 3.0, in which arrays are arrays [2.0]
+    ssp_version
+        1.0, or 2.0 for arrays and types of FMI 3.0 [1.0 where it can say what the system is]
+    step, stop
+        what a system is to be run with, s [what the scenario says]
     """
     from fmus.export import export as export_fmu
 
     from .scenario import find_participant
 
-    member = find_participant(participant)
-    path = out or Path(f"{participant.rpartition(':')[2]}.fmu")
-    export_fmu(member, path, platforms=list(platform) or None, fmi_version=fmi_version)
+    platforms = list(platform) or None
+    if ":" in what:
+        member = find_participant(what)
+        path = out or Path(f"{what.rpartition(':')[2]}.fmu")
+        export_fmu(member, path, platforms=platforms, fmi_version=fmi_version or "2.0")
+    else:
+        scenario = load_scenario(what)
+        path = out or Path(f"{scenario.name}.ssp")
+        experiment = {"step": step or scenario.seconds("STEP"), "stop": stop or scenario.seconds("STOP")}
+        _export_system(scenario.function("build")(), path, platforms, fmi_version, ssp_version, **experiment)
     print(f"{path} ({path.stat().st_size / 1024:.0f} KB)")
+
+
+def _export_system(
+    system: System,
+    path: Path,
+    platforms: list[str] | None,
+    fmi_version: str | None,
+    ssp_version: str | None,
+    step: float | None,
+    stop: float | None,
+) -> None:
+    from fmus.ssp import export_ssp
+
+    if path.suffix != ".ssp":
+        raise ScenarioError(
+            f"a system leaves as an .ssp, not as {path}; a participant, SCENARIO:NAME, leaves as an .fmu"
+        )
+    export_ssp(
+        system,
+        path,
+        step=step,
+        stop=stop,
+        version=ssp_version,
+        fmi_version=fmi_version,
+        platforms=platforms,
+    )
 
 
 @_app.command(name="inspect")

@@ -9,6 +9,9 @@ types and defaults.
     figures(result) -> {name: matplotlib figure}            optional
     table(**options) -> [row, ...]                          optional, rows are dicts
     table_text(rows) -> str                                 optional
+    STEP, STOP                                              optional, s: what an exported system is run with
+
+An .fmu and an .ssp are scenarios too (fmu_scenario.py, ssp_scenario.py).
 """
 
 from __future__ import annotations
@@ -20,10 +23,12 @@ import pkgutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
 from .errors import CosimError, WiringError, did_you_mean
+from .fmu import FMU
 from .participant import Participant
 from .result import Result
 
@@ -63,6 +68,11 @@ class Scenario:
             )
         function: Callable[..., Any] = found
         return function
+
+    def seconds(self, name: str) -> float | None:
+        """Return STEP or STOP of the scenario, if it has one."""
+        found = getattr(self.module, name, None)
+        return float(found) if isinstance(found, (int, float)) else None
 
     @property
     def run(self) -> Callable[..., Result]:
@@ -112,26 +122,68 @@ def _cell(value: Any) -> str:
 
 
 def load_scenario(name: str) -> Scenario:
-    """Load a scenario by its name, or a user's Python file or FMU by its path."""
+    """Load a scenario by its name, or a user's Python file, FMU or SSP by its path."""
     if name.endswith(".fmu"):
         from .fmu_scenario import fmu_scenario
 
         return fmu_scenario(Path(name))
+    if name.endswith(".ssp"):
+        from .ssp_scenario import ssp_scenario
+
+        return ssp_scenario(Path(name))
     if name.endswith(".py"):
         path = Path(name)
-        if not path.is_file():
-            raise ScenarioError(f"there is no file {path}; give the path of a scenario or one of its names")
-        spec = importlib.util.spec_from_file_location(path.stem, path)
-        if spec is None or spec.loader is None:
-            raise ScenarioError(f"{path} cannot be loaded as a Python file")
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[path.stem] = module
-        sys.path.insert(0, str(path.parent.resolve()))
-        spec.loader.exec_module(module)
-        return Scenario(path.stem, module)
+        return Scenario(path.stem, load_file(path))
     if name not in scenario_names():
         raise ScenarioError(f"there is no scenario '{name}'" + did_you_mean(name, scenario_names()))
     return Scenario(name, importlib.import_module(f"scenarios.{name}"))
+
+
+def load_file(path: Path) -> ModuleType:
+    """Load a user's Python file; what it imports from its own folder is found."""
+    if not path.is_file():
+        raise ScenarioError(f"there is no file {path}; give the path of a scenario or one of its names")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise ScenarioError(f"{path} cannot be loaded as a Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    sys.path.insert(0, str(path.parent.resolve()))
+    try:
+        spec.loader.exec_module(module)
+    except CosimError:
+        raise
+    except Exception as error:  # whatever the user's file does
+        lines = [f.lineno for f in extract_tb(error.__traceback__) if f.filename == spec.origin]
+        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+        raise ScenarioError(f"{path}, line {line}: {type(error).__name__}: {error}") from error
+    return module
+
+
+def find_part(text: str) -> Participant | FMU | type[Participant]:
+    """Find what `file.py:Class`, `module:Class`, `module:instance` or `scenario:participant` names."""
+    where, colon, wanted = text.rpartition(":")
+    if not colon:
+        raise ScenarioError(f"'{text}': write FILE.py:CLASS, module:CLASS or scenario:participant")
+    if where.endswith(".py"):
+        module = load_file(Path(where))
+    elif where in scenario_names():
+        module = importlib.import_module(f"scenarios.{where}")
+    else:
+        try:
+            module = importlib.import_module(where)
+        except ModuleNotFoundError as error:
+            raise ScenarioError(
+                f"'{text}': there is no module '{error.name}'; a file is named FILE.py"
+            ) from error
+    found = getattr(module, wanted, None)
+    if isinstance(found, (Participant, FMU)) or (isinstance(found, type) and issubclass(found, Participant)):
+        return found
+    if found is None and hasattr(module, "build"):
+        return find_participant(text)
+    classes = {n: v for n, v in vars(module).items() if isinstance(v, type) and issubclass(v, Participant)}
+    parts = [n for n, v in classes.items() if not v.__module__.startswith("cosim.")]
+    raise ScenarioError(f"{where} has no block '{wanted}'" + did_you_mean(wanted, parts))
 
 
 def find_participant(text: str) -> Participant:

@@ -28,6 +28,7 @@ from .errors import CosimError, WiringError, did_you_mean
 from .fmu import FMU
 from .fmu_ports import unit_of
 from .model_description import read_description
+from .participant import Block, Participant
 from .ssp_format import (
     FMU_TYPE,
     NAMESPACES,
@@ -67,16 +68,21 @@ class Package:
     experiment: Experiment
 
 
-def read_ssp(path: str | PathLike[str], *, replace: Mapping[str, Member] | None = None) -> System:
+def read_ssp(
+    path: str | PathLike[str], *, replace: Mapping[str, Member | type[Participant]] | None = None
+) -> System:
     """Return the system of an SSP; `replace` puts participants in the place of components, by name.
 
     A participant in the place of a component has ports with the names of its connectors; the
-    values that the package binds to that component are not for it.
+    values that the package binds to that component are not for it. A class is made with its
+    own start values, and acts with the period that the component has.
     """
     return read_package(path, replace=replace).system
 
 
-def read_package(path: str | PathLike[str], *, replace: Mapping[str, Member] | None = None) -> Package:
+def read_package(
+    path: str | PathLike[str], *, replace: Mapping[str, Member | type[Participant]] | None = None
+) -> Package:
     """Return the system and the default experiment of an SSP."""
     with Archive(Path(path), "SSP") as archive:
         return _Reader(archive, dict(replace or {})).package()
@@ -85,10 +91,12 @@ def read_package(path: str | PathLike[str], *, replace: Mapping[str, Member] | N
 class _Reader:
     """Reads one package."""
 
-    def __init__(self, archive: Archive, replace: dict[str, Member]) -> None:
+    def __init__(self, archive: Archive, replace: dict[str, Member | type[Participant]]) -> None:
         self.where = archive.path.name
         self.archive = archive
         self.replace = replace
+        #: what took the place of components
+        self.replaced: dict[str, Member] = {}
         self.extraction: Extraction | None = None
         self.root = parse_xml(self.read(ROOT, self.where), f"{self.where}/{ROOT}")
         version = self.root.get("version", "none")
@@ -130,7 +138,9 @@ class _Reader:
             if name not in names:
                 raise WiringError(f"{self.where} has no component '{name}'" + did_you_mean(name, names))
         for name, element in names.items():
-            system.add(name, self.replace[name] if name in self.replace else self._fmu(element, links))
+            system.add(
+                name, self._other(name, element) if name in self.replace else self._fmu(element, links)
+            )
         for link in links:
             if link.origin.path in self.structure.components and not self._sets_parameter(link):
                 self._connect(system, link)
@@ -146,6 +156,19 @@ class _Reader:
         return False
 
     # ---------------------------------------------------------------------- components
+
+    def _other(self, name: str, element: Element) -> Member:
+        """Return the participant that takes the place of a component."""
+        given = self.replace[name]
+        if isinstance(given, type):
+            where = f"{self.where}: {name} is replaced by a {given.__name__}"
+            options = self._options(element, where) if issubclass(given, Block) else {}
+            try:
+                given = given(**{n: options[n] for n in ("every", "sample_period") if n in options})
+            except CosimError as error:
+                raise type(error)(f"{where}: {error}") from error
+        self.replaced[name] = given
+        return given
 
     def _fmu(self, element: Element, links: list[Link]) -> FMU:
         where = f"{self.where}: component {'.'.join(element.path)}"
@@ -230,9 +253,9 @@ class _Reader:
             late = None if initial is None else np.array(initial)
             system.connect(a, b, initial=late, transformation=transformation)
         except WiringError as error:
-            ends = [element_name(n.path) for n in (origin, target) if element_name(n.path) in self.replace]
-            for name in ends:
-                member = self.replace[name]
+            ends = (element_name(node.path) for node in (origin, target))
+            for name in (n for n in ends if n in self.replaced):
+                member = self.replaced[name]
                 ports = ", ".join([*inputs_of(member), *outputs_of(member)])
                 text += f" ({name} is replaced by a {type(member).__name__}, ports: {ports})"
             raise WiringError(f"{self.where}: {text}: {error}") from error

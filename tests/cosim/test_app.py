@@ -131,7 +131,7 @@ def test_export_and_inspect(scenario, tmp_path, capsys):
         (("run", "chattering", "--cas", "2"), "Did you mean"),
         (("run", "chattering", "--case", "9"), "Choose from"),
         (("table", "nothing"), "there is no scenario 'nothing'"),
-        (("export", "chattering"), "scenario:participant"),
+        (("export", "chattering", "--out", "chattering.zip"), "leaves as an .ssp"),
         (("export", "chattering:plnt"), "did you mean 'plant'"),
         (("export", "chattering:plant", "--platform", "x86_64-linx"), "x86_64-linux"),
         (("export", "chattering:plant", "--fmi-version", "1.0"), "2.0"),
