@@ -49,7 +49,8 @@ class CoSimulationInstance(EventInstance):
     def step(self, fraction: float = 0.0) -> list[Op]:
         """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
         stepped = (replace(op, fraction=fraction) for op in self.advance())
-        return [*self.latch(), *stepped, *(replace(op, text="") for op in self.read())]
+        read = [*self.read(), *self.read_texts()]
+        return [*self.latch(), *stepped, *(replace(op, text="") for op in read)]
 
     def advance(self) -> list[Op]:
         """Do the step."""

@@ -81,7 +81,8 @@ class Fmi2(Adapter):
 
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
-        return self.attempt("get its inputs", lambda: getattr(self.api, f"get{access}")(references))  # type: ignore[no-any-return]
+        values = self.attempt("get its values", lambda: getattr(self.api, f"get{access}")(references))
+        return [v.decode(errors="replace") for v in values] if access == "String" else list(values)
 
     def asks_to_end(self) -> float | None:
         """Ask an FMU that discarded a step whether it wants to end the run."""

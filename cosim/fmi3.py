@@ -104,4 +104,4 @@ class Fmi3(Adapter):
 
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
-        return self.attempt("get its inputs", lambda: getattr(self.api, f"get{access}")(references, count))  # type: ignore[no-any-return]
+        return self.attempt("get its values", lambda: getattr(self.api, f"get{access}")(references, count))  # type: ignore[no-any-return]

@@ -124,8 +124,13 @@ class FMU:
         self.input_ports = self._ports(v for v in numeric if v.causality == "input" and v.alias is None)
         #: other names of inputs (FMI 3.0)
         self.aliases = {
-            v.name: v.alias.name for v in numeric if v.causality == "input" and v.alias is not None
+            v.name: v.alias.name
+            for v in self.variables.values()
+            if v.causality == "input" and v.alias is not None
         }
+        texts = [v for v in self.variables.values() if v.type in ("String", "Binary")]
+        self.text_inputs = {v.name: v for v in texts if v.causality == "input" and v.alias is None}
+        self.text_outputs = {v.name: v for v in texts if v.causality in ("output", "local")}
         self.inputs = {n: (p.shape, p.unit) for n, p in self.input_ports.items()}
         self.outputs = {n: (p.shape, p.unit) for n, p in self.output_ports.items()}
         #: the outputs proper, without local variables: what is recorded unless it is said

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ctypes
 from abc import abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,9 @@ class EventInstance(FMUInstance):
         native = [op for x in self.inputs if x not in waiting for op in self._set_inputs(x)]
         waiting = [x for x in waiting if self.used & x.addresses.keys()]
         forget = [self._scaled(x.told, x.told, 0.0) for x in self.outputs if x.is_clock]
-        if not waiting and not self.fmu.clocks:
+        if not self.event_mode:
+            return [*native, *self._latch_texts()]
+        if not waiting and not self.fmu.clocks and not self.text_sources:
             return native
         tell = self.failures.guard(self.name, lambda t, h: self._tell(t, waiting))
         self.input_callbacks.append(tell)
@@ -84,11 +87,17 @@ class EventInstance(FMUInstance):
                 ticking += x.references[x.values != 0.0].tolist()
         plain = (x for x in waiting if not (x.is_clock or x.clocks))
         changed = [x for x in plain if not np.array_equal(x.raw, x.told)]
-        if ticking or changed:
-            self._event(t, False, ticking, changed)
+        texts = self._new_texts()
+        if ticking or changed or texts:
+            self._event(t, False, ticking, changed, texts)
 
     def _event(
-        self, t: float, at_end: bool, ticking: Sequence[int] = (), changed: Iterable[Exchange] = ()
+        self,
+        t: float,
+        at_end: bool,
+        ticking: Sequence[int] = (),
+        changed: Iterable[Exchange] = (),
+        texts: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         """Handle an event at t, inside a step or at its end; clocks may tick and inputs change."""
         self.fmi.attempt("enter event mode", self.api.enterEventMode)
@@ -96,6 +105,7 @@ class EventInstance(FMUInstance):
             self.fmi.attempt("activate its clocks", lambda: self.api.setClock(ticking, [True] * len(ticking)))
         for x in changed:
             self._set_now(x)
+        self._set_texts(texts)
         ends = self._discrete_states(t, set(ticking))
         self._resume()
         if ends:

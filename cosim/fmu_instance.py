@@ -6,6 +6,7 @@ What all instances share; co_simulation.py and model_exchange.py add how they ad
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
@@ -16,7 +17,7 @@ from .errors import FMUError, SnapshotError
 from .fmu import FMU
 from .fmu_ports import FMUPort
 from .instances import Failures, buffer
-from .opcodes import FROM_FLOAT, TO_FLOAT, Number, Op
+from .opcodes import CALL, FROM_FLOAT, TO_FLOAT, Number, Op
 
 
 class Exchange:
@@ -77,6 +78,12 @@ class FMUInstance:
             raise
         self.inputs = self._exchanges(fmu.input_ports)
         self.outputs = self._exchanges({n: p for n, p in fmu.output_ports.items() if n in used})
+        #: the strings and binary data that were got last, by output (None before), and set last, by input
+        self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}
+        self.told_texts: dict[str, Any] = {}
+        #: where those of inputs come from
+        self.text_sources: dict[str, tuple[FMUInstance, str]] = {}
+        self.text_callbacks: list[Any] = []
         self.has_outputs = bool(self.outputs)
 
     def _exchanges(self, ports: dict[str, FMUPort]) -> list[Exchange]:
@@ -133,8 +140,8 @@ class FMUInstance:
         """Tell whether the FMU can give its state as bytes."""
         return bool(self.can_save and self.fmi.interface.canSerializeFMUstate)
 
-    def save(self, serialised: bool = True) -> tuple[list[Any], Any]:
-        """Return the buffers, and the state of the FMU: as bytes if it can, else kept until `stop`."""
+    def save(self, serialised: bool = True) -> tuple[Any, ...]:
+        """Return buffers and texts, and the state of the FMU: as bytes if it can, else kept until `stop`."""
         state = self.fmi.attempt("get its state", self.api.getFMUState)
         if serialised and self.can_serialise:
             serialise = self.api.serializeFMUState
@@ -143,11 +150,11 @@ class FMUInstance:
         else:
             kept = state
             self.kept.append(state)
-        return [array.copy() for array in self.arrays()], kept
+        return [array.copy() for array in self.arrays()], kept, (dict(self.texts), dict(self.told_texts))
 
     def restore(self, saved: Any) -> None:
         """Return to what `save` returned, which stays as it is."""
-        arrays, kept = saved
+        arrays, kept, texts = saved
         if self.fmi.status == 4:
             raise SnapshotError(
                 f"{self.name} ended with a fatal error and takes no calls any more; start anew"
@@ -162,6 +169,7 @@ class FMUInstance:
             self.fmi.attempt("free its state", lambda: self.api.freeFMUState(state))
         for array, values in zip(self.arrays(), arrays, strict=True):
             array[:] = values
+        self.texts, self.told_texts = (dict(each) for each in texts)
 
     def forget(self, saved: Any) -> None:
         """Free a state that was kept."""
@@ -215,13 +223,47 @@ class FMUInstance:
 
     def latch(self) -> list[Op]:
         """Set the inputs."""
-        return [op for x in self.inputs for op in self._set_inputs(x)]
+        numbers = [op for x in self.inputs for op in self._set_inputs(x)]
+        return [*numbers, *self._latch_texts()]
 
     def _set_inputs(self, x: Exchange) -> list[Op]:
         return [*self._from_floats(x), self._values("Set", x)]
 
     def _from_floats(self, x: Exchange) -> list[Op]:
         return [] if x.raw is x.values else [self._convert(FROM_FLOAT, x, x.values, x.raw)]
+
+    # --------------------------------------------------------- strings and binary data
+
+    def _text_op(self, what: str, function: Callable[[float, float], None]) -> Op:
+        self.text_callbacks.append(self.failures.guard(self.name, function))
+        address = ctypes.cast(self.text_callbacks[-1], ctypes.c_void_p).value or 0
+        return Op(f"{self.name}: {what} (Python callback)", CALL, address, participant=self.name)
+
+    def read_texts(self) -> list[Op]:
+        """Get the strings and binary data that are used."""
+        return [self._text_op("text outputs", self._get_texts)] if self.texts else []
+
+    def _latch_texts(self) -> list[Op]:
+        if not self.text_sources:
+            return []
+        return [self._text_op("text inputs", lambda t, h: self._set_texts(self._new_texts()))]
+
+    def _get_texts(self, t: float, h: float) -> None:
+        for name in self.texts:
+            v = self.fmu.text_outputs[name]
+            empty: Any = "" if v.type == "String" else b""
+            self.texts[name] = self.fmi.get(v.type, [v.valueReference], 1)[0] or empty
+
+    def _new_texts(self) -> dict[str, Any]:
+        """Return the texts of inputs that are others than what was set last."""
+        coming = {name: source.texts[port] for name, (source, port) in self.text_sources.items()}
+        told = self.told_texts
+        return {name: text for name, text in coming.items() if text not in (None, told.get(name))}
+
+    def _set_texts(self, texts: Mapping[str, Any]) -> None:
+        for name, text in texts.items():
+            self.fmi.set(self.fmu.text_inputs[name], [text])
+        self.told_texts.update(texts)
 
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output, the inputs on which it depends directly."""

@@ -46,6 +46,12 @@ class IteratedCoupling:
                 f"{', '.join(unable)} cannot get and set its state (canGetAndSetFMUState), which iterated "
                 'coupling needs to repeat a step; use coupling="sampled", or export it with that capability'
             )
+        ticking = [n for n in self.members if getattr(program.system.participants[n], "clocks", None)]
+        if ticking:
+            raise WiringError(
+                f"{', '.join(ticking)} has clocks, which would tick at every repetition of a step; "
+                'use coupling="sampled"'
+            )
         self._sources = list(dict.fromkeys(c.source for c in connections))
         self._views = [_floats(program.address(p), p.count) for p in self._sources]
         n = 0

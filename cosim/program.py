@@ -13,6 +13,7 @@ sample period at the communication points only.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterable
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import groupby
@@ -44,6 +45,7 @@ from .opcodes import (
 from .participant import Block, Continuous
 from .system import Connection, Port, System, cycle_text, is_block
 from .tableaus import TABLEAUS
+from .text_ports import TextPort
 from .time_grid import steps_between
 from .variables import Array
 
@@ -67,6 +69,7 @@ class Program:
         decimation: int,
         jit: bool,
         tolerance: float = 1e-8,
+        texts: Iterable[TextPort] = (),
     ) -> None:
         self.system = system
         self.h = h
@@ -74,6 +77,7 @@ class Program:
         self.instances: dict[str, Instance] = {}
         self._alone: dict[str, str] = {}  # FMUs that can be there once only, by token
         self.buffers: list[Array] = []
+        self.callbacks: list[Any] = []
         self.iteration: IteratedCoupling | None = None
         self.first: list[Op] = []
         self.second: list[Op] = []
@@ -81,12 +85,17 @@ class Program:
         self.watched = statistics
         self.coupling = f"stage coupling, {solver}" if coupling == "continuous" else f"{coupling} coupling"
         stage = coupling == "continuous"
+        #: strings and binary data to record, and what was, a list a port
+        self.recorded_texts: dict[TextPort, list[str | bytes]] = {port: [] for port in texts}
         ends = [end for c in system.connections for end in (c.source, c.target)]
+        heard = [c.source for c in system.text_connections]
         used = {(p.participant, p.name) for p in [*record, *statistics, *ends]}
+        used |= {(p.participant, p.name) for p in [*self.recorded_texts, *heard]}
         try:
             for name, member in system.participants.items():
                 ports = {port for participant, port in used if participant == name}
                 self.instances[name] = self._instance(name, member, stage, jit, ports)
+            self._connect_texts()
             self.order = system.block_order()
             self.rates = {name: self._rate(name) for name in self.order}
             #: memory of the connections that are one step late, by their index
@@ -238,6 +247,20 @@ class Program:
         acting = instance.step(fraction)
         return [*self._copies(name, delays, every), *(replace(op, every=every) for op in acting)]
 
+    def _connect_texts(self) -> None:
+        for c in self.system.text_connections:
+            source, target = self._fmu(c.source.participant), self._fmu(c.target.participant)
+            target.text_sources[c.target.name] = source, c.source.name
+
+    def _fmu(self, name: str) -> FMUInstance:
+        instance = self.instances[name]
+        assert isinstance(instance, FMUInstance)  # texts are ports of FMUs only
+        return instance
+
+    def _read_texts(self, name: str) -> list[Op]:
+        instance = self.instances[name]
+        return instance.read_texts() if isinstance(instance, FMUInstance) else []
+
     # ----------------------------------------------------------------- recorded signals
 
     def _addresses(self, ports: list[Port]) -> Table:
@@ -255,14 +278,25 @@ class Program:
         self.columns, m = len(self.recorded_addresses), len(self.watched_addresses)
         self.statistics = buffer(4 * m)[: 4 * m].reshape(m, 4)
         ops = []
+        if self.recorded_texts:
+            guarded = self.failures.guard("record", lambda t, h: self.keep_texts())
+            self.callbacks.append(guarded)
+            address = ctypes.cast(guarded, ctypes.c_void_p).value or 0
+            names = ", ".join(map(str, self.recorded_texts))
+            ops.append(Op(f"record {names} (Python callback)", CALL, address, every=decimation))
         if m:
             a, b = int(self.watched_addresses.ctypes.data), int(self.statistics.ctypes.data)
             ops.append(Op(f"statistics of {_names(self.watched)}", STATISTICS, a=a, b=b, n=m))
-        if self.columns:
+        if self.columns or self.recorded_texts:
             a = int(self.recorded_addresses.ctypes.data)
-            text = f"record {_names(self.recorded)}"
+            text = f"record {_names(self.recorded)}" if self.columns else ""
             ops.append(Op(text, RECORD, a=a, n=self.columns, every=decimation))
         return ops
+
+    def keep_texts(self) -> None:
+        """Record the strings and binary data of the present point."""
+        for port, rows in self.recorded_texts.items():
+            rows.append(self._fmu(port.participant).texts[port.name])
 
     # ----------------------------------------------------------------- sampled coupling
 
@@ -277,6 +311,7 @@ class Program:
         for name in moving:
             if self.instances[name].has_outputs:
                 self.first += self.instances[name].read()
+            self.first += self._read_texts(name)
         for name in self.order:
             self.first += self._block(name, delays, every=self.rates[name] or 1)
         self.first += self._sinks(decimation)
@@ -319,6 +354,8 @@ class Program:
                 if stage > 0:
                     ops += _state_of(instance, work[name], row, f"{name}: states of stage {stage + 1}")
                 ops += instance.set_states(c)
+            if stage == 0:
+                ops += [op for name in moving for op in self._read_texts(name)]
             ops += self._evaluation(rounds, delays, c, stage)
             if stage == 0:
                 self.first = [*ops, *self._sinks(decimation), *self._remember(delays)]

@@ -26,6 +26,14 @@ def _values(value: Any) -> Any:
     return np.array(value) if isinstance(value, list) else value
 
 
+def _as_json(text: Any) -> Any:
+    return {"hex": text.hex()} if isinstance(text, bytes) else text
+
+
+def _from_json(text: Any) -> Any:
+    return bytes.fromhex(text["hex"]) if isinstance(text, dict) else text
+
+
 @dataclass(frozen=True)
 class Statistics:
     """Statistics of one port over all communication points 0..n, with its shape (m,) or as numbers.
@@ -53,6 +61,8 @@ class Result:
         (r,) recorded communication points in s
     signals
         port name -> (r,) or (r, m)
+    texts
+        port name of a String or Binary -> a str or bytes at each recorded point
     interrupted
         True when the run was stopped before its end; what was computed is here
     ended
@@ -69,8 +79,11 @@ class Result:
     schedule: str = ""
     interrupted: bool = False
     ended: str = ""
+    texts: dict[str, list[Any]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
+        if name in self.texts:
+            raise WiringError(f"{name} is text; it is in result.texts[{name!r}]")
         if name not in self.signals:
             raise WiringError(f"the result has no signal '{name}'" + did_you_mean(name, self.signals))
         return self.signals[name]
@@ -92,7 +105,9 @@ class Result:
         """Write everything as .npz (exact), or the signals as .csv (17 digits)."""
         path = Path(path)
         if path.suffix == ".npz":
-            meta = json.dumps({name: getattr(self, name) for name in _SAVED} | {"statistics": self._listed()})
+            kept = {name: getattr(self, name) for name in _SAVED}
+            texts = {n: [_as_json(v) for v in values] for n, values in self.texts.items()}
+            meta = json.dumps(kept | {"statistics": self._listed(), "texts": texts})
             arrays: dict[str, Any] = {"time": self.time, **self.signals}
             np.savez(path, _meta=np.array(meta), **arrays)
         elif path.suffix == ".csv":
@@ -113,7 +128,9 @@ class Result:
                 signals = {n: data[n] for n in data.files if n not in ("_meta", "time")}
                 listed = meta.pop("statistics")
                 statistics = {port: Statistics(*map(_values, values)) for port, values in listed.items()}
-                return cls(data["time"], signals, statistics=statistics, **meta)
+                saved = meta.pop("texts", {})
+                texts = {n: [_from_json(v) for v in values] for n, values in saved.items()}
+                return cls(data["time"], signals, statistics=statistics, texts=texts, **meta)
         except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
             raise RecordError(f"{path} is no result that was saved as .npz: {error}") from error
 

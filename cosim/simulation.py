@@ -46,6 +46,7 @@ from .program import Program
 from .result import Result, Statistics
 from .system import Port, System, inputs_of, outputs_of
 from .tableaus import TABLEAUS
+from .text_ports import TextPort, text_port
 from .time_grid import steps_between
 from .variables import Array
 
@@ -117,10 +118,11 @@ class Simulation:
             "jit": jit,
             "tolerance": tolerance,
         }
-        recorded = _ports(system, self._options["record"])
+        texts, wanted = _texts(system, self._options["record"])
+        recorded = _ports(system, wanted)
         watched = recorded if statistics is None else _ports(system, self._options["statistics"])
         self._program = Program(
-            system, self.step, coupling, solver, recorded, watched, self.decimation, jit, tolerance
+            system, self.step, coupling, solver, recorded, watched, self.decimation, jit, tolerance, texts
         )
         self._loop: Loop | None = None
         #: the point that comes next, or, once its outputs have been evaluated, the present one
@@ -194,6 +196,8 @@ class Simulation:
         loop.record_to(self._data)
         loop.report[:] = 0
         program.statistics[:] = np.inf, -np.inf, 0.0, 0.0
+        for texts in program.recorded_texts.values():
+            texts.clear()
         if self._acted:
             x = program.values(program.watched_addresses)
             if len(x):
@@ -201,6 +205,7 @@ class Simulation:
             loop.report[4] = 1
             if self._k % self.decimation == 0:
                 self._data[0] = program.values(program.recorded_addresses)
+                program.keep_texts()
                 loop.report[3] = 1
 
     def _room(self, last: int) -> Array:
@@ -352,6 +357,7 @@ class Simulation:
             time=self.start + k * self.step,
             signals=signals,
             units={str(p): p.unit for p in [*program.recorded, *program.watched]},
+            texts={str(port): texts[:rows] for port, texts in program.recorded_texts.items()},
             statistics=self._statistics(sampled),
             step=self.step,
             steps=self._k - self._first,
@@ -407,6 +413,13 @@ def _names(names: Iterable[str]) -> list[str]:
     if isinstance(names, str):
         raise WiringError(f"'{names}' is one name; give a list of ports, [\"{names}\"]")
     return list(names)
+
+
+def _texts(system: System, names: list[str] | None) -> tuple[list[TextPort], list[str] | None]:
+    """Return the ports to record that are strings or binary data, and the names of the others."""
+    found = {name: text_port(system, name, "output") for name in names or ()}
+    texts = [port for port in found.values() if port is not None]
+    return texts, None if names is None else [name for name in names if found[name] is None]
 
 
 def _ports(system: System, names: list[str] | None) -> list[Port]:

@@ -25,6 +25,7 @@ import numpy as np
 from .errors import WiringError, did_you_mean
 from .fmu import FMU
 from .participant import Block, Participant
+from .text_ports import TextConnection, text_connection
 from .units import conversion
 from .variables import Array
 
@@ -97,6 +98,8 @@ class System:
     ) -> None:
         self.participants: dict[str, Member] = {}
         self.connections: list[Connection] = []
+        #: those of strings and binary data
+        self.text_connections: list[TextConnection] = []
         #: the connections of every input port, and the pairs of participants that are connected without delay
         self._feeding: dict[tuple[str, str], list[Connection]] = {}
         self._links: set[tuple[str, str]] = set()
@@ -135,8 +138,12 @@ class System:
         connection by one communication step and is the source's value, in its unit,
         before the first point: the way to break a cycle of blocks. `transformation`
         (factor, offset), target = factor * source + offset, takes the place of the units'
-        conversion.
+        conversion. A String of an FMU goes to a String input, a Binary to a Binary one.
         """
+        texts = text_connection(self, source, target, initial is None and transformation is None)
+        if texts is not None:
+            self._add_texts(texts)
+            return
         out = self.port(source, "output")
         into = self.port(target, "input")
         if out.count != into.count and out.count != 1:
@@ -171,6 +178,14 @@ class System:
             raise
         self._links.add(link)
 
+    def _add_texts(self, connection: TextConnection) -> None:
+        self.text_connections.append(connection)
+        try:
+            self.block_order()
+        except WiringError:
+            self.text_connections.pop()
+            raise
+
     def port(self, text: str, direction: str) -> Port:
         """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
         where, dot, name = text.partition(".")
@@ -198,15 +213,19 @@ class System:
             raise WiringError(
                 f"{text} is an {'output' if direction == 'input' else 'input'}, not an {direction}"
             )
+        if isinstance(member, FMU) and name in member.text_inputs | member.text_outputs:
+            raise WiringError(f"{text} is text, not a number")
         raise WiringError(f"{where} has no {direction} '{base}'" + did_you_mean(base, ports))
 
     def block_order(self) -> list[str]:
         """Return the blocks in the order of their connections; a cycle of blocks is an error."""
         blocks = [n for n, m in self.participants.items() if is_block(m)]
         graph: dict[str, list[str]] = {name: [] for name in blocks}
-        for c in self.connections:
-            a, b = c.source.participant, c.target.participant
-            if a in graph and b in graph and c.initial is None:
+        direct = (c for c in self.connections if c.initial is None)
+        links = [(c.source.participant, c.target.participant) for c in direct]
+        links += [(c.source.participant, c.target.participant) for c in self.text_connections]
+        for a, b in links:
+            if a in graph and b in graph:
                 graph[b].append(a)
         try:
             return list(TopologicalSorter(graph).static_order())

@@ -104,6 +104,8 @@ def export_ssp(
         raise SSPError(f"no SSP version '{version}'; choose from {', '.join(VERSIONS)}")
     if not system.participants:
         raise SSPError("a system without participants has nothing to export")
+    for texts in system.text_connections:
+        raise SSPError(f"{texts.source} -> {texts.target} is text, which is not written to an SSP yet")
     fmi_version = fmi_version or ("3.0" if version == "2.0" else "2.0")
     wanted = None if platforms is None else list(platforms)
     parts = _parts(system, fmi_version, wanted)

@@ -34,6 +34,8 @@ COMMON = [
     ("quarters", 14, "Integer", "Int32", "output", "", ""),
     ("end_at", 15, "Real", "Float64", "parameter", 'start="1e9"', None),
     ("early_at", 16, "Real", "Float64", "parameter", 'start="1e9"', None),
+    ("text_in", 17, "String", "String", "input", 'start=""', None),
+    ("text_out", 18, "String", "String", "output", "", "text_in"),
 ]
 
 
@@ -91,7 +93,7 @@ def description3(once: bool) -> str:
         inside = '<Dimension valueReference="40"/>' if name.startswith("v_") else ""
         inside += {"x": '<Alias name="x_alias"/>', "r_in": '<Alias name="r_other"/>'}.get(name, "")
         if kind == "String":
-            attributes, inside = "", '<Start value=""/>'
+            attributes, inside = "", '<Start value=""/>' if attributes else ""
         extra = ' derivative="11"' if name == "der(x)" else ""
         extra += ' initial="exact" start="0"' if name == "x" else ""
         variables.append(

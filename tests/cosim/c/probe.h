@@ -2,6 +2,7 @@
 
      r_out = 2 r_in; every other NAME_out = NAME_in + 1, b_out = not b_in, e_out = e_in
      v_out[i] = 2 v_in[n + 1 - i]
+     text_out = text_in
      label_length, blob_sum: what the string and the binary parameter came to
      x' = 1; a state event takes 1 from x when 1 - x <= 0:           x(t) = t mod 1
      stair counts time events at 0.75, 1.5, ...                       floor(t / 0.75)
@@ -15,12 +16,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { X = 11, DER_X, STAIR, QUARTERS, END_AT, EARLY_AT, LABEL = 9, LABEL_LENGTH = 10 };
+enum { X = 11, DER_X, STAIR, QUARTERS, END_AT, EARLY_AT, LABEL = 9, LABEL_LENGTH = 10, TEXT_IN = 17, TEXT_OUT };
 enum { R_IN = 1, R_OUT, I_IN, I_OUT, B_IN, B_OUT, E_IN, E_OUT, F32_IN = 36, N = 40, V_IN, V_OUT, BLOB, BLOB_SUM, Z };
 
 struct probe {
     long double in[64]; /* inputs and parameters by value reference; long double holds a 64-bit integer */
     double v[8], time, x, next;
+    char text[64];
     int n, stair, quarters, steps, label_length, blob_sum;
     bool step_event, terminated, continuous_time;
 };

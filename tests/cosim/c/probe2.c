@@ -21,7 +21,7 @@ SAME(fmi2Reset) SAME(fmi2Terminate) SAME(fmi2EnterInitializationMode) SAME(fmi2E
 SAME(fmi2SetDebugLogging) SAME(fmi2CancelStep)
 
 #define NOT_THERE(name) EXPORT fmi2Status name(P) { return fmi2Error; }
-NOT_THERE(fmi2GetString) NOT_THERE(fmi2GetFMUstate) NOT_THERE(fmi2SetFMUstate) NOT_THERE(fmi2FreeFMUstate)
+NOT_THERE(fmi2GetFMUstate) NOT_THERE(fmi2SetFMUstate) NOT_THERE(fmi2FreeFMUstate)
 NOT_THERE(fmi2SerializedFMUstateSize) NOT_THERE(fmi2SerializeFMUstate) NOT_THERE(fmi2DeSerializeFMUstate)
 NOT_THERE(fmi2GetDirectionalDerivative) NOT_THERE(fmi2SetRealInputDerivatives)
 NOT_THERE(fmi2GetRealOutputDerivatives) NOT_THERE(fmi2GetStatus) NOT_THERE(fmi2GetIntegerStatus)
@@ -50,8 +50,16 @@ VALUES(Integer, int)
 VALUES(Boolean, int)
 
 EXPORT fmi2Status fmi2SetString(P, const unsigned vr[], size_t n, const fmi2String values[]) {
+    if (n == 1 && vr[0] == TEXT_IN && !p->continuous_time && strlen(values[0]) < sizeof p->text)
+        return strcpy(p->text, values[0]), fmi2OK;
     if (n != 1 || vr[0] != LABEL) return fmi2Error;
     p->label_length = (int)strlen(values[0]);
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2GetString(P, const unsigned vr[], size_t n, fmi2String values[]) {
+    if (n != 1 || (vr[0] != TEXT_IN && vr[0] != TEXT_OUT)) return fmi2Error;
+    values[0] = p->text;
     return fmi2OK;
 }
 

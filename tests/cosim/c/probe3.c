@@ -72,6 +72,8 @@ VALUES(UInt64, uint64_t)
 VALUES(Boolean, bool)
 
 EXPORT fmi3Status fmi3SetString(P, const unsigned vr[], size_t n, const fmi3String values[], size_t n_values) {
+    if (n == 1 && vr[0] == TEXT_IN && !p->continuous_time && strlen(values[0]) < sizeof p->text)
+        return strcpy(p->text, values[0]), fmi3OK;
     if (n != 1 || vr[0] != LABEL) return fmi3Error;
     p->label_length = (int)strlen(values[0]);
     return fmi3OK;
@@ -81,6 +83,12 @@ EXPORT fmi3Status fmi3SetBinary(P, const unsigned vr[], size_t n, const size_t s
     if (n != 1 || vr[0] != BLOB) return fmi3Error;
     p->blob_sum = 0;
     for (size_t i = 0; i < sizes[0]; i++) p->blob_sum += values[0][i];
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetString(P, const unsigned vr[], size_t n, fmi3String values[], size_t n_values) {
+    if (n != 1 || (vr[0] != TEXT_IN && vr[0] != TEXT_OUT)) return fmi3Error;
+    values[0] = p->text;
     return fmi3OK;
 }
 
