@@ -343,9 +343,8 @@ def test_the_independent_variable_finds_a_free_name(tmp_path: Path) -> None:
 
 
 def test_every_platform_has_its_folder(tmp_path: Path) -> None:
-    path = export(
-        building(), tmp_path / "b.fmu", fmi_version="3.0", platforms=["x86_64-linux", "aarch64-linux"]
-    )
+    platforms = {"x86_64-linux": "so", "aarch64-linux": "so", "aarch64-darwin": "dylib"}
+    path = export(building(), tmp_path / "b.fmu", fmi_version="3.0", platforms=platforms)
     with zipfile.ZipFile(path) as archive:
         names = {n for n in archive.namelist() if n.startswith("binaries/")}
-    assert names == {f"binaries/{a}-linux/ShearBuilding.so" for a in ("x86_64", "aarch64")}
+    assert names == {f"binaries/{name}/ShearBuilding.{suffix}" for name, suffix in platforms.items()}

@@ -79,15 +79,15 @@ def test_macos_on_one_architecture(tmp_path: Path) -> None:
 
 
 @pytest.mark.long  # the very first link for Windows builds its C library: more than a minute
-def test_windows(tmp_path: Path) -> None:
-    data = binaries(export(Oscillator(), tmp_path / "o.fmu", platforms=["x86_64-windows"]))[
-        "win64/Oscillator.dll"
-    ]
+@pytest.mark.parametrize(("version", "folder"), [("2.0", "win64"), ("3.0", "x86_64-windows")])
+def test_windows(tmp_path: Path, version: str, folder: str) -> None:
+    path = export(Oscillator(), tmp_path / "o.fmu", platforms=["x86_64-windows"], fmi_version=version)
+    data = binaries(path)[f"{folder}/Oscillator.dll"]
     (place,) = struct.unpack_from("<I", data, 0x3C)
     assert data[:2] == b"MZ"
     assert data[place : place + 4] == b"PE\0\0"
     assert struct.unpack_from("<H", data, place + 4)[0] == 0x8664
-    assert b"fmi2DoStep" in data
+    assert f"fmi{version[0]}DoStep".encode() in data
     assert b"kernel_advance" not in data
 
 

@@ -1,0 +1,352 @@
+"""The conformance table: what of FMI 2.0 and 3.0 is there, which FMU exercises it, which test shows it.
+
+    python -m tests.conformance         prints it as Markdown, as it stands in the README
+
+`test_conformance.py` asserts that the tests exist, run in the ordinary suite, and that the README
+has this very table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+PASS, NONE = "pass", "–"
+
+#: where the FMUs come from: name -> file and what it has
+FMUS = {
+    "ours": ("fmus/export.py", "plants and blocks of ours, exported"),
+    "probe": ("tests/cosim/c/probe.h", "C; all types, events, arrays, structural parameters"),
+    "ball": ("tests/cosim/c/ball2.c", "C; Model Exchange with state and time events, failures on demand"),
+    "metronome": ("tests/cosim/c/metronome.c", "C; FMI 3.0 Co-Simulation with event mode and clocks"),
+    "pythonfmu": ("tests/others.py", "made by pythonfmu 0.7 (FMI 2.0) and pythonfmu3 0.3 (FMI 3.0)"),
+    "broken": ("tests/cosim/test_archive.py", "damaged and hostile archives and descriptions"),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A feature; `fmi2` and `fmi3` are PASS, NONE (not in that version) or "no", then `note` says why."""
+
+    feature: str
+    fmi2: str
+    fmi3: str
+    fmus: str
+    tests: list[str]
+    note: str = ""
+
+
+def both(feature: str, fmus: str, tests: list[str], note: str = "") -> Row:
+    return Row(feature, PASS, PASS, fmus, tests, note)
+
+
+def only3(feature: str, fmus: str, tests: list[str], note: str = "") -> Row:
+    return Row(feature, NONE, PASS, fmus, tests, note)
+
+
+F3, ME = "cosim/test_fmu3.py", "cosim/test_model_exchange.py"
+EVENTS, STATES = "cosim/test_co_simulation_events.py", "cosim/test_simulation.py"
+
+TABLE: dict[str, list[Row]] = {
+    "In": [
+        both("Co-Simulation", "probe, ours", [f"{F3}::test_hand_written_fmus_are_valid_and_run_in_fmpy"]),
+        both(
+            "plants made by others, tool coupling",
+            "pythonfmu",
+            ["scenarios/test_examples.py::test_a_controller_on_somebody_elses_plant"],
+        ),
+        both(
+            "Model Exchange, ode1 to ode4 in the compiled loop",
+            "ours",
+            ["test_conformance.py::test_model_exchange_of_both_versions", f"{ME}::test_order_of_convergence"],
+        ),
+        both(
+            "Model Exchange, CVODE for stiff plants",
+            "ours",
+            [
+                "test_conformance.py::test_model_exchange_of_both_versions",
+                f"{ME}::test_a_stiff_plant_with_held_inputs",
+            ],
+        ),
+        both(
+            "state, time and step events",
+            "probe, ball",
+            [
+                f"{F3}::test_state_time_and_step_events",
+                f"{ME}::test_a_bouncing_ball_against_its_closed_form",
+                f"{ME}::test_time_events_are_met_exactly",
+            ],
+        ),
+        both(
+            "real, integer, boolean, enumeration variables in and out",
+            "probe",
+            [f"{F3}::test_every_type_goes_in_and_out"],
+        ),
+        only3(
+            "Float32, Int8 to UInt64 to their limits",
+            "probe",
+            [f"{F3}::test_numbers_of_all_widths_at_their_limits"],
+        ),
+        both("strings as start values", "probe", [f"{F3}::test_units_strings_and_dependencies"]),
+        only3("binary data as start values", "probe", [f"{F3}::test_binary_start_values"]),
+        only3(
+            "arrays as ports with shapes; structural parameters in configuration mode",
+            "probe",
+            [f"{F3}::test_structural_parameters_size_arrays"],
+        ),
+        only3(
+            "early return",
+            "probe, metronome",
+            [f"{F3}::test_an_early_return_is_continued", f"{EVENTS}::test_events_inside_steps"],
+        ),
+        only3("event mode in Co-Simulation", "metronome", [f"{EVENTS}::test_events_inside_steps"]),
+        only3(
+            "clocks, periodic and triggered, in and out",
+            "metronome",
+            [
+                "cosim/test_clocks.py::test_periodic_clocks",
+                "cosim/test_clocks.py::test_a_triggered_input_clock_ticks_when_it_is_not_0",
+                "cosim/test_clocks.py::test_an_output_clock_reads_1_when_it_has_ticked_since_the_last_point",
+            ],
+            "Co-Simulation",
+        ),
+        both(
+            "an FMU asks to end",
+            "probe, ball",
+            [f"{F3}::test_a_request_to_end_ends_the_run", f"{ME}::test_a_request_to_end_in_an_event"],
+        ),
+        both("one instance per process", "probe", [f"{F3}::test_an_fmu_that_can_be_there_only_once"]),
+        both(
+            "instances of one FMU share an extraction",
+            "ours",
+            ["cosim/test_archive.py::test_fmus_of_one_file_share_a_folder_while_there_is_one"],
+        ),
+        both(
+            "start values and parameters by name",
+            "ours, probe",
+            [
+                "cosim/test_fmu.py::test_start_values_of_parameters_and_of_inputs_that_nothing_feeds",
+                f"{F3}::test_units_strings_and_dependencies",
+            ],
+        ),
+        both(
+            "units, converted on connections",
+            "probe",
+            [f"{F3}::test_units_strings_and_dependencies", "cosim/test_wiring.py::test_units_are_converted"],
+        ),
+        only3("aliases", "probe", [f"{F3}::test_aliases_are_names_of_one_variable"]),
+        both(
+            "dependencies: left out means all, empty none",
+            "probe",
+            [f"{F3}::test_units_strings_and_dependencies"],
+        ),
+        both(
+            "snapshot, restore, branch; who cannot is named",
+            "ours, probe",
+            [
+                f"{STATES}::test_a_snapshot_is_returned_to_exactly_and_a_branch_goes_its_own_way",
+                f"{STATES}::test_participants_that_cannot_keep_their_state_are_named",
+            ],
+        ),
+        both(
+            "an FMU in the place of a block", "ours", [f"{F3}::test_a_block_as_fmu_acts_where_the_block_acts"]
+        ),
+        both(
+            "damaged and hostile archives are an error",
+            "broken",
+            [
+                "cosim/test_archive.py::test_a_path_out_of_the_folder",
+                "cosim/test_fuzzed_fmu.py::test_changed_archives",
+            ],
+        ),
+        Row("Scheduled Execution", NONE, "no", "", [], "a master with fixed steps has no scheduler to offer"),
+        Row("the FMI project's Reference FMUs", "no", "no", "", [], "not at hand, so not run here"),
+    ],
+    "Out": [
+        both(
+            "every block and plant; no finding of FMPy and fmutool; the same bits in our loop",
+            "ours",
+            [
+                "fmus/test_every_class.py::test_the_table_has_every_class",
+                "fmus/test_every_class.py::test_a_class_leaves",
+            ],
+        ),
+        both(
+            "controllers and plants close the loop in FMPy",
+            "ours",
+            ["fmus/test_controllers_elsewhere.py::test_a_loop_of_fmpys_calls_closes_the_loop"],
+        ),
+        both(
+            "and in ecos",
+            "ours",
+            ["fmus/test_controllers_elsewhere.py::test_ecos_closes_the_loop"],
+            "FMI 3.0: scalars, ecos has no arrays",
+        ),
+        only3(
+            "arrays as arrays",
+            "ours",
+            [
+                "fmus/test_fmu3.py::test_arrays_are_arrays",
+                "fmus/test_fmu3.py::test_values_go_in_and_out_as_arrays",
+            ],
+        ),
+        both(
+            "Co-Simulation with any step, Model Exchange",
+            "ours",
+            [
+                "fmus/test_fmu_trajectories.py::test_steps_of_any_length_are_exact",
+                "fmus/test_fmu_trajectories.py::test_model_exchange_in_fmpy",
+                "fmus/test_fmu3.py::test_model_exchange_in_fmpy",
+            ],
+        ),
+        both(
+            "state: get, set, serialise",
+            "ours",
+            [
+                "fmus/test_fmu_state.py::test_a_restored_state_continues_bit_for_bit",
+                "fmus/test_fmu3.py::test_a_state_as_bytes_in_another_instance",
+            ],
+        ),
+        both(
+            "reset; many instances",
+            "ours",
+            [
+                "fmus/test_fmu_state.py::test_reset_repeats_the_run_bit_for_bit",
+                "fmus/test_fmu_state.py::test_cycles_do_not_grow",
+                "test_conformance.py::test_reset_and_many_instances",
+            ],
+        ),
+        both(
+            "directional derivatives",
+            "ours",
+            [
+                "fmus/test_fmu_trajectories.py::test_directional_derivatives_of_a_linear_plant",
+                "fmus/test_fmu3.py::test_directional_derivatives_by_arrays",
+            ],
+        ),
+        both(
+            "dependencies, exact; units",
+            "ours",
+            [
+                "fmus/test_fmu_validity.py::test_dependencies_are_exact_by_element",
+                "fmus/test_fmu_validity.py::test_every_variable_with_a_unit_has_it_defined_in_base_units",
+                "test_conformance.py::test_the_structure_is_the_same_in_both_versions",
+            ],
+        ),
+        both(
+            "misuse is an error with a reason",
+            "ours",
+            [
+                "fmus/test_fmu_misuse.py::test_misuse_is_an_error_with_a_reason_and_changes_nothing",
+                "fmus/test_fmu3.py::test_misuse_is_an_error_with_a_reason",
+            ],
+        ),
+        both(
+            "reference result (FMI-LS-REF)",
+            "ours",
+            [
+                "fmus/test_fmu_validity.py::test_the_reference_result_is_what_fmpy_simulates",
+                "fmus/test_fmu_validity.py::test_both_versions_of_fmi_compute_the_same_bits",
+            ],
+        ),
+        both(
+            "for Linux and macOS from any machine",
+            "ours",
+            [
+                "fmus/test_fmu_link.py::test_linux",
+                "fmus/test_fmu_link.py::test_macos_is_one_universal_library",
+                "fmus/test_fmu3.py::test_every_platform_has_its_folder",
+            ],
+        ),
+        both(
+            "for Windows from any machine",
+            "ours",
+            ["fmus/test_fmu_link.py::test_windows"],
+            "`-m long`: the first link takes a minute",
+        ),
+        Row(
+            "early return, event mode, clocks, strings",
+            NONE,
+            "no",
+            "",
+            [],
+            "kernels have floats and no events inside a step; nothing of ours needs them",
+        ),
+    ],
+    "Systems": [
+        both(
+            "SSP 1.0 and 2.0 out and in: connections, parameters, units",
+            "ours",
+            [
+                "fmus/test_ssp.py::test_the_same_bits_after_the_way_through_a_file",
+                "cosim/test_ssp.py::test_values_come_from_files_through_mappings_and_prefixes",
+            ],
+        ),
+        both(
+            "a Python block in the place of a component",
+            "ours",
+            ["fmus/test_ssp.py::test_a_python_block_in_place_of_a_component"],
+        ),
+        Row(
+            "an SSP of ours in ecos, libcosim and FMPy",
+            PASS,
+            "no",
+            "ours",
+            ["fmus/test_ssp_elsewhere.py::test_the_same_numbers_elsewhere"],
+            "SSP 1.0; these tools have no arrays, libcosim no FMI 3.0",
+        ),
+    ],
+    "Strong coupling": [
+        both(
+            "force and motion by Newton, with rollback",
+            "ours",
+            [
+                "cosim/test_iterated.py::test_fmus_give_what_python_gives",
+                "cosim/test_iterated.py::test_what_is_exchanged_agrees_at_every_communication_point",
+            ],
+        ),
+        both(
+            "the delay of plain coupling, measured",
+            "ours",
+            [
+                "cosim/test_iterated.py::test_the_delay_of_plain_coupling_is_of_first_order_and_iterated_coupling_of_second"
+            ],
+        ),
+        both(
+            "loud when it does not converge",
+            "ours",
+            ["cosim/test_iterated.py::test_a_coupling_without_solution_ends_the_run_with_what_was_computed"],
+        ),
+    ],
+}
+
+
+def cited(row: Row) -> list[str]:
+    """The tests of a row as pytest names them, from the project's folder."""
+    return [f"tests/{name}" for name in row.tests]
+
+
+def rows() -> list[Row]:
+    return [row for group in TABLE.values() for row in group]
+
+
+def markdown() -> str:
+    """The table as it stands in the README."""
+    lines = []
+    for group, listed in TABLE.items():
+        lines += [f"| **{group}** | FMI 2.0 | FMI 3.0 | FMU | test |", "|---|---|---|---|---|"]
+        for row in listed:
+            note = f" ({row.note})" if row.note else ""
+            tests = ", ".join(
+                f"[{name.partition('::')[2].removeprefix('test_')}]({name.partition('::')[0]})"
+                for name in cited(row)
+            )
+            lines.append(
+                f"| {row.feature}{note} | {row.fmi2} | {row.fmi3} | {row.fmus or NONE} | {tests or NONE} |"
+            )
+        lines.append("")
+    lines += [f"- `{name}`: [{place}]({place}), {what}" for name, (place, what) in FMUS.items()]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(markdown())
