@@ -11,15 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim import Result, simulate
 from cosim.app import main
 from fmus.export import export
-from scenarios import building_in_fmpy, external_plant
+from scenarios import building_in_fmpy, controller_in_ssp, external_plant
 from tests.others import swing
 
 SCENARIOS = Path(external_plant.__file__).parent
 
 
-@pytest.mark.parametrize("name", ["external_plant", "building_in_fmpy"])
+@pytest.mark.parametrize("name", ["external_plant", "building_in_fmpy", "controller_in_ssp"])
 def test_an_example_is_short(name: str) -> None:
     lines = (SCENARIOS / f"{name}.py").read_text().splitlines()
     assert sum(bool(line) for line in lines) < 60
@@ -88,3 +89,29 @@ def test_the_loop_imports_fmpy_only() -> None:
     names = {(n.module if isinstance(n, ast.ImportFrom) else n.names[0].name).split(".")[0]
              for n in tree.body if isinstance(n, (ast.Import, ast.ImportFrom))}  # fmt: skip
     assert names == {"math", "sys", "typing", "fmpy"}
+
+
+def test_a_controller_in_an_ssp(tmp_path: Path) -> None:
+    """ecos computes our loop with its delays; without them the loop is another one.
+
+    1e-12: the ground reads the time, which ecos sums up from steps.
+    """
+    ssp = tmp_path / "loop.ssp"
+    late = controller_in_ssp.run(ssp=ssp, late=True)["building.x"][:, 2]
+    roof = np.array(controller_in_ssp.ecos(ssp))
+    assert np.abs(roof - late).max() <= 1e-12 * np.abs(late).max()
+    sampled = controller_in_ssp.run(ssp=ssp)
+    assert np.abs(sampled["building.x"][:, 2] - roof).max() > 0.01 * np.abs(roof).max()
+    python = simulate(controller_in_ssp.build(), step=controller_in_ssp.STEP, stop=controller_in_ssp.STOP)
+    assert np.array_equal(python["building.x"], sampled["building.x"])
+
+
+def test_another_controller_in_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    controller_in_ssp.run(ssp=Path("loop.ssp"))
+    source = SCENARIOS / "controller_in_ssp.py"
+    Path("mine.py").write_text(source.read_text().replace("class RoofDamper", "class Mine"))
+    main(["run", "loop.ssp", "--replace", "control=mine.py:Mine", "--no-figures", "--out", "mine"])
+    main(["run", "loop.ssp", "--no-figures", "--out", "own"])
+    runs = [Result.load(Path(name) / "result.npz")["building.x"] for name in ("mine", "own")]
+    assert np.abs(runs[0] - runs[1]).max() <= 1e-12 * np.abs(runs[1]).max()  # kN by two ways: the last bits
