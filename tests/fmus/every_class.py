@@ -41,6 +41,7 @@ from cosim.blocks.noise import MeasurementNoise
 from cosim.blocks.sensor import SensorDynamics, StateSpace, StrictlyProper, transfer_function
 from cosim.blocks.sources import Constant, RecordSource, WhiteNoise, _FunctionOfTime, function_source
 from cosim.blocks.sum import WeightedSum
+from cosim.blocks.table_source import TableSource
 from cosim.participant import Participant
 from fmus.benchmark_bridge import benchmark_bridge
 from fmus.damped_tower import DampedTower
@@ -127,6 +128,10 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     RecordSource: [
         lambda: RecordSource(_random(40), 0.013, scale=1.7, start=0.1),
         lambda: RecordSource(_random(40), 0.013, interpolation="hold"),
+    ],
+    TableSource: [
+        lambda: TableSource([0.0, 0.113, 0.113, 0.7], _random(4, 2)),
+        lambda: TableSource([0.0, 0.113, 0.3], _random(3), interpolation="hold"),
     ],
     _FunctionOfTime: [lambda: function_source(lambda t: 25.0 * (math.sin(t) + 1.0))],
     WeightedSum: [lambda: WeightedSum([1.0, -0.3, 7.0])],

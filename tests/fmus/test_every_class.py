@@ -1,8 +1,9 @@
 """Any block and plant of ours leaves: both versions of FMI, no finding, the same trajectory in our own loop.
 
 Every class in the packages is walked (every_class.py). Participant, FMI 2.0 and FMI 3.0 stand
-side by side in one system, driven by the same noise; a block's FMU acts as a block. They are the
-same bits: one LLVM IR, no fast-math, and the same libm.
+side by side in one system, driven by the same noise; a block's FMU acts as a block, a plant's runs as
+Co-Simulation and, under stage coupling, as Model Exchange. They are the same bits: one LLVM IR, no
+fast-math, and the same libm.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import logging
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +22,7 @@ from fmu_manipulation_toolbox.cli.fmutool import fmutool
 
 from cosim import FMU, System, simulate
 from cosim.blocks import Constant, WhiteNoise
-from cosim.participant import Block, Participant
+from cosim.participant import Block, Continuous, Participant
 from cosim.system import inputs_of, outputs_of
 from fmus.export import FMI_VERSIONS, export
 from fmus.highway_bridge import highway_bridge
@@ -68,7 +70,9 @@ def fmutool_says(
     return says
 
 
-def side_by_side(ours: Participant, paths: dict[str, Path], steps: int, h: float) -> dict[str, np.ndarray]:
+def side_by_side(
+    ours: Participant, paths: dict[str, Path], steps: int, h: float, **options: Any
+) -> dict[str, np.ndarray]:
     """Run a participant and its FMUs on the same noise; return every port of each."""
     rate = {"every": ours.every, "sample_period": ours.sample_period} if isinstance(ours, Block) else {}
     as_block = isinstance(ours, Block)
@@ -84,7 +88,7 @@ def side_by_side(ours: Participant, paths: dict[str, Path], steps: int, h: float
             for member in ("ours", *fmus):
                 system.connect(part, f"{member}.{name}")
     wanted = [f"{m}.{port}" for m in ("ours", *fmus) for port in outputs_of(ours)]
-    result = simulate(system, step=h, stop=steps * h, record=wanted)
+    result = simulate(system, step=h, stop=steps * h, record=wanted, **options)
     return {port: result[port] for port in wanted}
 
 
@@ -102,10 +106,14 @@ def check_leaves(
         assert "No semantic error" in said
         assert "ERROR" not in said
         assert "WARNING" not in said
-    signals = side_by_side(ours, paths, steps, h)
-    for port, values in signals.items():
-        expected = signals["ours." + port.partition(".")[2]]
-        assert np.array_equal(values, expected), f"{port}: off by {np.abs(values - expected).max()}"
+    couplings: list[dict[str, str]] = [{}]
+    if isinstance(ours, Continuous) and "derivatives" in ours.kernels:
+        couplings.append({"coupling": "continuous", "solver": "ode3"})  # Model Exchange
+    for options in couplings:
+        signals = side_by_side(ours, paths, steps, h, **options)
+        for port, values in signals.items():
+            expected = signals["ours." + port.partition(".")[2]]
+            assert np.array_equal(values, expected), f"{port}: off by {np.abs(values - expected).max()}"
     return signals
 
 
