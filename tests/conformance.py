@@ -166,7 +166,7 @@ TABLE: dict[str, list[Row]] = {
             "every block and plant; no finding of FMPy and fmutool; the same bits in our loop",
             "ours",
             [
-                "fmus/test_every_class.py::test_the_table_has_every_class",
+                "fmus/test_every_class.py::test_every_class_can_be_made",
                 "fmus/test_every_class.py::test_a_class_leaves",
             ],
         ),
