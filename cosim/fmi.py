@@ -10,12 +10,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from .errors import FMUError
+from .errors import FMUError, SimulationError
 from .fmu_ports import Shape
+from .instances import Failures, ctrl_c
+from .isolation import Isolation, support_library
 from .opcodes import Number
 from .shared_library import check_library, library_name
 from .variables import Array
@@ -73,7 +76,7 @@ class Adapter(ABC):
     COMPLETED: ClassVar[int]
     FLAG: ClassVar[str]
 
-    def __init__(self, fmu: FMU, name: str, model_exchange: bool) -> None:
+    def __init__(self, fmu: FMU, name: str, model_exchange: bool, failures: Failures) -> None:
         self.fmu = fmu
         self.name = name
         self.messages: list[str] = []
@@ -84,19 +87,58 @@ class Adapter(ABC):
         self.answer: StepAnswer | None = None
         description = fmu.description
         self.interface = description.modelExchange if model_exchange else description.coSimulation
-        check_library(fmu.directory / library_name(self.platform(), self.interface.modelIdentifier))
+        #: where the FMU runs, if not in this process
+        self.process: Isolation | None = None
+        library = fmu.directory / library_name(self.platform(), self.interface.modelIdentifier)
+        check_library(library)
         try:
+            with ctrl_c(failures):
+                self._load(library, failures)
+                self.attempt("instantiate", self._instantiate)
+            if failures.interrupted:
+                raise KeyboardInterrupt
+        except BaseException:
+            self.close()
+            raise
+
+    def _load(self, library: Path, failures: Failures) -> None:
+        identifier = self.interface.modelIdentifier
+        try:
+            if self.fmu.isolated:
+                self.process = Isolation(self.name, library, failures)
+                # which FMPy joins to the folder of binaries: of an absolute path nothing else remains
+                identifier = str(support_library().with_suffix(""))
             # FMPy goes to the library's folder and stays there when it does not load
-            with chdir(fmu.directory):
-                self.api: Any = self._class(model_exchange)(
-                    guid=description.guid,
-                    unzipDirectory=str(fmu.directory),
-                    modelIdentifier=self.interface.modelIdentifier,
-                    instanceName=name,
+            with chdir(self.fmu.directory):
+                self.api: Any = self._class(self.model_exchange)(
+                    guid=self.fmu.description.guid,
+                    unzipDirectory=str(self.fmu.directory),
+                    modelIdentifier=identifier,
+                    instanceName=self.name,
                 )
         except Exception as error:  # FMPy raises bare Exception when a library does not load
-            raise FMUError(f"{name}: the binary of {fmu.path} cannot be loaded: {error}") from error
-        self.attempt("instantiate", self._instantiate)
+            raise FMUError(f"{self.name}: the binary of {self.fmu.path} cannot be loaded: {error}") from error
+
+    def function(self, name: str) -> Any:
+        """Return a function of FMI for the loop."""
+        function = getattr(self.api.dll, name)
+        return function if self.process is None else getattr(self.api.dll, f"loop_{name}", function)
+
+    def close(self) -> None:
+        """End the process of an isolated FMU."""
+        if self.process is not None:
+            self.process.close()
+
+    @property
+    def is_gone(self) -> bool:
+        """Tell whether the process of an isolated FMU has ended, or has been given up."""
+        return self.process is not None and self.process.is_gone
+
+    def crash(self) -> str:
+        """Return how an isolated FMU crashed, or ""."""
+        if self.process is None or not self.process.crash:
+            return ""
+        return f"{self.name} ({self.fmu.path.name}) {self.process.crash}"
 
     @staticmethod
     @abstractmethod
@@ -154,7 +196,11 @@ class Adapter(ABC):
         try:
             return call()
         except Exception as error:  # FMPy raises FMICallException and bare Exception alike
+            if self.process is not None:
+                self.process.raise_interrupted()
             log = "".join(f"\n  {line}" for line in self.messages[-8:])
+            if crash := self.crash():
+                raise SimulationError(f"{crash}, when it was to {what}{log}") from error
             raise FMUError(f"{self.name} ({self.fmu.path.name}) failed to {what}: {error}{log}") from error
 
     def note(self, status: int, message: bytes | None) -> None:
@@ -166,6 +212,10 @@ class Adapter(ABC):
     def failure(self, status: int, t: float, what: str = "") -> str:
         """Return what it means that a function returned a status at t, and remember it for the end."""
         self.status = status
+        if self.process is not None:
+            self.process.raise_interrupted()
+        if crash := self.crash():
+            return f"{crash}; look at its inputs and at its log"
         label = _LABELS.get(status)
         named = f"{self.PREFIX}{label.capitalize()}" if label else f"status {status}"
         return f"{self.name} failed{what} at t = {t:g} s with {named}; look at its inputs and at its log"

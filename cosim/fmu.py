@@ -71,6 +71,9 @@ class FMU:
         it. Without, an FMU handles its events inside its steps
     every, sample_period
         of a block: at every so many-th communication point only, as for a Block
+    isolated
+        every instance runs in a process of its own (isolation.py): a crash in the FMU's code is
+        a SimulationError with what was computed until then, and costs a few microseconds a step
     """
 
     def __init__(
@@ -86,6 +89,7 @@ class FMU:
         event_mode: bool | None = None,
         every: int | None = None,
         sample_period: float | None = None,
+        isolated: bool = False,
     ) -> None:
         self.path = Path(path)
         #: the participant that was exported to this file, where that is known
@@ -98,6 +102,7 @@ class FMU:
         self.substeps = substeps
         self.tolerance = DEFAULT_TOLERANCE if tolerance is None else tolerance
         self.as_block = as_block
+        self.isolated = isolated
         self.every, self.sample_period = rate(self.path.name, every, sample_period)
         with Archive(self.path) as archive:
             self.description = description_of(archive)

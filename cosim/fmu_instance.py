@@ -13,10 +13,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .errors import FMUError, SnapshotError
+from .errors import CosimError, SnapshotError
 from .fmu import FMU
 from .fmu_ports import FMUPort
-from .instances import Failures, buffer
+from .instances import Failures, buffer, ctrl_c
 from .opcodes import CALL, FROM_FLOAT, TO_FLOAT, Number, Op
 
 
@@ -69,11 +69,11 @@ class FMUInstance:
         self.start_values = {n: v for n, v in given.items() if n not in structural | fmu.clocks.keys()}
         #: the intervals of clocks that were given
         self.intervals = {n: v for n, v in given.items() if n in fmu.clocks}
-        self.fmi = fmu.adapter(fmu, name, self.model_exchange)
+        self.fmi = fmu.adapter(fmu, name, self.model_exchange, failures)
         self.api = self.fmi.api
         try:
             self.fmi.configure({n: given[n] for n in structural})
-        except FMUError:
+        except CosimError:
             self.stop()
             raise
         self.inputs = self._exchanges(fmu.input_ports)
@@ -115,9 +115,17 @@ class FMUInstance:
         for name, values in self.start_values.items():
             self.fmi.set(self.fmu.variables[name], values)
 
-    def stop(self) -> None:
-        """Terminate and free the instance; after a fatal error it must not be called any more."""
-        if self.fmi.status == 4:
+    def stop(self) -> str:
+        """Terminate and free the instance; return how it crashed in that, if it is isolated and did."""
+        before = self.fmi.crash()
+        with ctrl_c(self.failures):
+            self._end()
+            after = self.fmi.crash()
+            self.fmi.close()
+        return after if after != before else ""
+
+    def _end(self) -> None:
+        if self.fmi.status == 4 or self.fmi.is_gone:  # after a fatal error it must not be called any more
             return
         ends = [partial(self.api.freeFMUState, state) for state in self.kept]
         if self.running and self.fmi.status < 3:
@@ -155,7 +163,7 @@ class FMUInstance:
     def restore(self, saved: Any) -> None:
         """Return to what `save` returned, which stays as it is."""
         arrays, kept, texts = saved
-        if self.fmi.status == 4:
+        if self.fmi.status == 4 or self.fmi.is_gone:
             raise SnapshotError(
                 f"{self.name} ended with a fatal error and takes no calls any more; start anew"
             )
@@ -183,7 +191,7 @@ class FMUInstance:
     # ---------------------------------------------------------------------- operations
 
     def _function(self, name: str) -> int:
-        return ctypes.cast(getattr(self.api.dll, name), ctypes.c_void_p).value or 0
+        return ctypes.cast(self.fmi.function(name), ctypes.c_void_p).value or 0
 
     @property
     def _component(self) -> int:

@@ -9,8 +9,11 @@ in the loop; FMUInstance (fmu_instance.py, model_exchange.py) for FMUs.
 from __future__ import annotations
 
 import ctypes
+import signal
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -80,6 +83,30 @@ class Failures:
             return 0
 
         return _KERNEL(guarded)
+
+
+@contextmanager
+def ctrl_c(failures: Failures) -> Iterator[None]:
+    """Note Ctrl-C, to be acted upon between chunks or after a callback.
+
+    Raised at any moment it may strike while Python enters a callback from C, where the
+    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def note(number: int, frame: object) -> None:
+        if failures.interrupted:
+            raise KeyboardInterrupt
+        failures.interrupted = True
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class CompiledKernelsWarning(UserWarning):
@@ -166,8 +193,9 @@ class KernelInstance:
                 "constant coefficients, which LinearContinuous needs; derive it from Continuous"
             )
 
-    def stop(self) -> None:
-        """Nothing to release."""
+    def stop(self) -> str:
+        """Nothing to release, nothing that could crash."""
+        return ""
 
     #: Python can be copied, and so can the record
     can_save = can_serialise = True

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .continuous_time import ContinuousTime
-from .errors import FMUError
+from .errors import CosimError
 from .event_steps import EventSteps, RungeKutta
 from .fmu import FMU
 from .fmu_events import EventInstance
@@ -41,7 +41,7 @@ class ModelExchangeInstance(EventInstance):
         super().__init__(name, fmu, failures, used)
         try:
             self.n_states, self.n_indicators = self.fmi.counts()
-        except FMUError:
+        except CosimError:
             self.stop()
             raise
         self.states = buffer(self.n_states)

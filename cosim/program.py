@@ -128,7 +128,8 @@ class Program:
         if stage and not member.as_block:
             self._check_stage(name, member)
         model_exchange = (stage and not member.as_block) or member.model_exchange
-        self._check_alone(name, member, model_exchange)
+        if not member.isolated:
+            self._check_alone(name, member, model_exchange)
         if model_exchange:
             return ModelExchangeInstance(name, member, self.failures, used)
         step = self.h * ((self._rate(name) or 1) if member.as_block else 1)
@@ -165,7 +166,7 @@ class Program:
         if other is not None:
             raise WiringError(
                 f"{name} and {other} are the same FMU, {fmu.path.name}, which can be instantiated only once "
-                "per process; run one of them alone, or use an FMU without this limit"
+                "per process; run each in a process of its own, FMU(..., isolated=True)"
             )
         if interface.canBeInstantiatedOnlyOncePerProcess:
             self._alone[description.guid] = name
@@ -178,10 +179,9 @@ class Program:
             return steps_between(block.sample_period, self.h, f"{name}: sample period")
         return block.every
 
-    def close(self) -> None:
-        """Free the FMU instances."""
-        for instance in self.instances.values():
-            instance.stop()
+    def close(self) -> list[str]:
+        """Free the FMU instances; return what isolated ones crashed in that, and how."""
+        return [crash for instance in self.instances.values() if (crash := instance.stop())]
 
     def _is_block(self, name: str) -> bool:
         return is_block(self.system.participants[name])

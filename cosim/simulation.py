@@ -16,13 +16,10 @@ from __future__ import annotations
 
 import math
 import shutil
-import signal
 import tempfile
-import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from numbers import Integral, Real
 from types import TracebackType
@@ -40,7 +37,7 @@ from .errors import (
     did_you_mean,
 )
 from .fmu import FMU
-from .instances import EndOfRun, Failures
+from .instances import EndOfRun, ctrl_c
 from .loop import Loop
 from .program import Program
 from .result import Result, Statistics
@@ -134,6 +131,7 @@ class Simulation:
         self._first = 0
         self._data: Array = np.empty((0, 0))
         self._began = 0.0
+        self._last: Result | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -141,13 +139,28 @@ class Simulation:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Terminate and free the FMUs; results stay."""
-        if not self._closed:
+        if error is None:
+            self.close()
+        elif not self._closed:
             self._closed = True
             self._program.close()
+
+    def close(self) -> None:
+        """Terminate and free the FMUs; results stay.
+
+        Raises SimulationError when an isolated FMU crashes in that, Interrupted on Ctrl-C while
+        it hangs in that, both with the last `result`.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        crashes = self._program.close()
+        if self._program.failures.interrupted:
+            raise Interrupted(self._last) if self._last is not None else KeyboardInterrupt
+        if crashes:
+            error = SimulationError("; ".join(crashes) + ", after the run, which is complete")
+            error.result = self._last
+            raise error
 
     @property
     def time(self) -> float:
@@ -167,11 +180,12 @@ class Simulation:
         last = steps_between(until - self.start, self.step, "the time from start to stop")
         if last < self._k or (last == self._k and self._acted):
             raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
-        with _ctrl_c(self._program.failures):
+        with ctrl_c(self._program.failures):
             self._check_usable("run")
             loop = self._begun()
             self._open_records(loop, last)
-            return self._run(loop, last, progress)
+            self._last = self._run(loop, last, progress)
+            return self._last
 
     def _begun(self) -> Loop:
         """Return the loop; the first time, compile it and initialize the participants."""
@@ -185,6 +199,9 @@ class Simulation:
             except SimulationError as error:
                 error.result = self._result(interrupted=True)
                 raise
+            except KeyboardInterrupt:
+                self._program.failures.clear()
+                raise Interrupted(self._result(interrupted=True)) from None
             self._incomplete = False
         return self._loop
 
@@ -438,30 +455,3 @@ def _readable(system: System, name: str) -> Port:
     if where in system.participants and port.partition("[")[0] in inputs_of(system.participants[where]):
         return system.port(name, "input")
     return system.port(name, "output")
-
-
-# ----------------------------------------------------------------------------------- loop
-
-
-@contextmanager
-def _ctrl_c(failures: Failures) -> Iterator[None]:
-    """Let Ctrl-C end the run between chunks or after a callback.
-
-    Raised at any moment it may strike while Python enters a callback from C, where the
-    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
-    """
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield
-        return
-
-    def note(number: int, frame: object) -> None:
-        if failures.interrupted:
-            raise KeyboardInterrupt
-        failures.interrupted = True
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,0 +1,96 @@
+/* Waiting for the other process: watch the word, as the answer mostly comes at once, then sleep.
+
+   Sleeping lets the other process run where all cores are busy, and watching in vain keeps it from
+   running. So who had to sleep watches shortly the next times; now and then it watches long again,
+   because the cores may have become free. Linux wakes the sleeper through a futex; elsewhere there
+   is nothing of that kind between processes, and it looks again after growing pauses. */
+
+#if defined __linux__
+#define _GNU_SOURCE /* syscall */
+#endif
+
+#include "channel.h"
+
+#include <time.h>
+
+#if defined __linux__
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
+
+enum {
+    LONG_WATCH = 50000, /* ns */
+    SHORT_WATCH = 500,
+    TRY_AGAIN = 64, /* waits */
+    LONGEST_SLEEP = 50000000,
+};
+
+static inline void pause_a_moment(void)
+{
+#if defined __x86_64__
+    __builtin_ia32_pause();
+#elif defined __aarch64__
+    __asm__ volatile("yield");
+#endif
+}
+
+static int64_t now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1000000000 * (int64_t)t.tv_sec + t.tv_nsec;
+}
+
+void channel_wake(_Atomic uint32_t *word)
+{
+#if defined __linux__
+    syscall(SYS_futex, word, FUTEX_WAKE, 1, NULL, NULL, 0);
+#else
+    (void)word;
+#endif
+}
+
+void channel_post(_Atomic uint32_t *word, uint32_t number, struct waiting *other)
+{
+    atomic_store(word, number); /* sequentially consistent with `sleeps`: one of both sees the other */
+    if (atomic_load(&other->sleeps))
+        channel_wake(word);
+}
+
+static bool watch(_Atomic uint32_t *word, uint32_t number, int64_t ns)
+{
+    const int64_t end = now() + ns;
+    do {
+        for (int i = 0; i < 8; i++) {
+            if (atomic_load_explicit(word, memory_order_acquire) == number)
+                return true;
+            pause_a_moment();
+        }
+    } while (now() < end);
+    return false;
+}
+
+static void sleep_until(_Atomic uint32_t *word, uint32_t number, struct waiting *self)
+{
+#if defined __linux__
+    atomic_store(&self->sleeps, 1);
+    const uint32_t seen = atomic_load(word);
+    if (seen != number)
+        syscall(SYS_futex, word, FUTEX_WAIT, seen, &(struct timespec){0, LONGEST_SLEEP}, NULL, 0);
+    atomic_store(&self->sleeps, 0);
+#else
+    (void)self;
+    for (long ns = 1000, all = 0; all < LONGEST_SLEEP && atomic_load(word) != number; all += ns, ns += ns / 8)
+        nanosleep(&(struct timespec){0, ns}, NULL);
+#endif
+}
+
+bool channel_wait(_Atomic uint32_t *word, uint32_t number, struct waiting *self)
+{
+    const bool is_long = self->patient || ++self->often % TRY_AGAIN == 0;
+    self->patient = watch(word, number, is_long ? LONG_WATCH : SHORT_WATCH) && is_long;
+    if (!self->patient && atomic_load(word) != number)
+        sleep_until(word, number, self);
+    return atomic_load(word) == number;
+}
