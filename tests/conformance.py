@@ -17,8 +17,12 @@ FMUS = {
     "ours": ("fmus/export.py", "plants and blocks of ours, exported"),
     "probe": ("tests/cosim/c/probe.h", "C; all types, events, arrays, structural parameters"),
     "ball": ("tests/cosim/c/ball2.c", "C; Model Exchange with state and time events, failures on demand"),
-    "metronome": ("tests/cosim/c/metronome.c", "C; FMI 3.0 Co-Simulation with event mode and clocks"),
+    "metronome": (
+        "tests/cosim/c/metronome.c",
+        "C; FMI 3.0 Co-Simulation with event mode, clocks, strings, binary data",
+    ),
     "pythonfmu": ("tests/others.py", "made by pythonfmu 0.7 (FMI 2.0) and pythonfmu3 0.3 (FMI 3.0)"),
+    "crash": ("tests/cosim/c/crash.c", "C; ends its process in any call"),
     "broken": ("tests/cosim/test_archive.py", "damaged and hostile archives and descriptions"),
 }
 
@@ -46,13 +50,15 @@ def only3(feature: str, fmus: str, tests: list[str], note: str = "") -> Row:
 F3, ME = "cosim/test_fmu3.py", "cosim/test_model_exchange.py"
 EVENTS, STATES = "cosim/test_co_simulation_events.py", "cosim/test_simulation.py"
 
+ISOLATED, EXAMPLES = "cosim/test_isolation.py", "scenarios/test_examples.py"
+
 TABLE: dict[str, list[Row]] = {
     "In": [
         both("Co-Simulation", "probe, ours", [f"{F3}::test_hand_written_fmus_are_valid_and_run_in_fmpy"]),
         both(
             "plants made by others, tool coupling",
             "pythonfmu",
-            ["scenarios/test_examples.py::test_a_controller_on_somebody_elses_plant"],
+            [f"{EXAMPLES}::test_a_controller_on_somebody_elses_plant"],
         ),
         both(
             "Model Exchange, ode1 to ode4 in the compiled loop",
@@ -86,8 +92,19 @@ TABLE: dict[str, list[Row]] = {
             "probe",
             [f"{F3}::test_numbers_of_all_widths_at_their_limits"],
         ),
-        both("strings as start values", "probe", [f"{F3}::test_units_strings_and_dependencies"]),
-        only3("binary data as start values", "probe", [f"{F3}::test_binary_start_values"]),
+        both(
+            "strings, as start values and from FMU to FMU",
+            "probe, metronome",
+            [
+                f"{F3}::test_units_strings_and_dependencies",
+                "cosim/test_text_ports.py::test_texts_of_both_versions",
+            ],
+        ),
+        only3(
+            "binary data, as start values and from FMU to FMU",
+            "probe, metronome",
+            [f"{F3}::test_binary_start_values", "cosim/test_text_ports.py::test_texts_go_from_fmu_to_fmu"],
+        ),
         only3(
             "arrays as ports with shapes; structural parameters in configuration mode",
             "probe",
@@ -294,6 +311,14 @@ TABLE: dict[str, list[Row]] = {
             ["fmus/test_ssp_elsewhere.py::test_the_same_numbers_elsewhere"],
             "SSP 1.0; these tools have no arrays, libcosim no FMI 3.0",
         ),
+        both(
+            "`cosim run loop.ssp`, with Python blocks named on the command line",
+            "ours",
+            [
+                "cosim/test_system_files.py::test_a_file_runs_as_its_scenario_does",
+                "cosim/test_system_files.py::test_a_controller_from_the_command_line",
+            ],
+        ),
     ],
     "Strong coupling": [
         both(
@@ -315,6 +340,56 @@ TABLE: dict[str, list[Row]] = {
             "loud when it does not converge",
             "ours",
             ["cosim/test_iterated.py::test_a_coupling_without_solution_ends_the_run_with_what_was_computed"],
+        ),
+    ],
+    "Isolation": [
+        both(
+            "an FMU in a process of its own: the same bits",
+            "ours, probe",
+            [f"{ISOLATED}::test_an_exported_plant", f"{ISOLATED}::test_numbers_of_all_types_and_events"],
+        ),
+        both(
+            "a crash ends the run with name, time and signal; what was computed is kept",
+            "crash, ours",
+            [
+                f"{ISOLATED}::test_a_crash_in_the_loop",
+                f"{ISOLATED}::test_a_crash_in_model_exchange",
+                "test_conformance.py::test_an_isolated_fmu_of_fmi_3_that_is_killed",
+            ],
+        ),
+        both(
+            "several instances of what a process can have once only",
+            "probe",
+            [
+                f"{ISOLATED}::test_several_instances_of_what_a_process_can_have_once_only",
+                "test_conformance.py::test_isolated_instances_of_fmi_3_that_a_process_can_have_once_only",
+            ],
+        ),
+        both(
+            "snapshot, restore, branch",
+            "ours",
+            [f"{ISOLATED}::test_states_are_saved_restored_and_branched"],
+        ),
+    ],
+    "Examples": [
+        both(
+            "`external_plant`: a controller on an FMU that others made",
+            "pythonfmu, ours",
+            [f"{EXAMPLES}::test_a_controller_on_somebody_elses_plant"],
+        ),
+        Row(
+            "`building_in_fmpy`: a building of ours in a loop of FMPy's calls",
+            PASS,
+            NONE,
+            "ours",
+            [f"{EXAMPLES}::test_a_building_in_somebody_elses_loop"],
+        ),
+        Row(
+            "`controller_in_ssp`: a controller of ours in an SSP, here and in ecos",
+            PASS,
+            NONE,
+            "ours",
+            [f"{EXAMPLES}::test_a_controller_in_an_ssp"],
         ),
     ],
 }

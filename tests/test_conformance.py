@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
+import signal
 from functools import cache
 from pathlib import Path
 
@@ -12,11 +14,14 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 
-from cosim import FMU, System, simulate
+from cosim import FMU, Block, Input, System, simulate
 from cosim.blocks import function_source
+from cosim.errors import SimulationError
 from fmus.export import export
 from fmus.oscillator import Oscillator
 from tests.conformance import FMUS, NONE, PASS, TABLE, Row, cited, markdown, rows
+from tests.cosim.probe import probe
+from tests.cosim.test_isolation import children
 from tests.fmus.host import building
 
 ROOT = Path(__file__).parents[1]
@@ -146,3 +151,33 @@ def test_reset_and_many_instances(buildings: dict[str, Path], tmp_path: Path) ->
         fmu.freeInstance()
     assert all(rows == runs[0] for rows in runs)
     assert len(set(runs[0])) == len(runs[0])
+
+
+class Killer(Block):
+    """Ends every process that this one has started, at 0.5 s."""
+
+    compiled = False
+    x = Input()
+
+    def step(self, t: float, h: float) -> None:
+        if t >= 0.5:
+            for process in children(os.getpid()):
+                os.kill(process, signal.SIGKILL)
+
+
+def test_an_isolated_fmu_of_fmi_3_that_is_killed(tmp_path: Path) -> None:
+    path = export(Oscillator(), tmp_path / "o.fmu", fmi_version="3.0")
+    system = System({"plant": FMU(path, isolated=True), "killer": Killer()}, [("plant.x", "killer.x")])
+    with pytest.raises(SimulationError, match=r"plant.*SIGKILL") as caught:
+        simulate(system, step=0.01, stop=1.0)
+    alone = simulate(System({"plant": FMU(path)}), step=0.01, stop=1.0)
+    kept = caught.value.result["plant.x"]
+    assert 50 <= len(kept) < 60
+    assert np.array_equal(kept, alone["plant.x"][: len(kept)])
+
+
+def test_isolated_instances_of_fmi_3_that_a_process_can_have_once_only(tmp_path: Path) -> None:
+    path = probe(tmp_path / "once.fmu", "3.0", once=True)
+    members = {n: FMU(path, isolated=True, start={"r_in": float(i)}) for i, n in enumerate("abc")}
+    result = simulate(System(members), step=0.0625, stop=0.0625)
+    assert [result[f"{n}.r_out"][0] for n in "abc"] == [0.0, 2.0, 4.0]
