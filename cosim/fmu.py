@@ -60,8 +60,8 @@ class FMU:
     substeps
         steps of a fixed-step solver in one communication step
     tolerance
-        relative tolerance of cvode, 1e-6 unless given; the absolute one of a state is that
-        times its nominal value
+        of cvode: relative error aimed at over a run, 1e-6 unless given (its steps are
+        controlled tighter); the absolute one of a state is that times its nominal value
     as_block
         acts as a Block does, at communication points in the order of the connections: set
         inputs, doStep from t_k, get outputs at t_k; what a Block that was exported needs
@@ -254,6 +254,8 @@ class FMU:
             number = self.adapter.NUMBERS[kind][1] if kind in self.adapter.NUMBERS else None
             try:
                 plain = np.asarray(value, dtype=object if number is None else None)
+                if plain.shape == (port.size,):  # a matrix may be given row by row, as FMI has it
+                    plain = plain.reshape(port.shape)
                 values = np.broadcast_to(plain, port.shape).ravel().tolist()
                 fits = all(_fits(kind, number, v) for v in values)
             except (TypeError, ValueError, OverflowError):

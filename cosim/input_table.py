@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,8 @@ def _number(path: Path, line: int, name: str, text: str) -> float:
         value = float(text) if value is None else value
     except ValueError:
         value = math.nan
+    if abs(value) >= 2.0**53 and re.fullmatch(r"[+-]?\d+", text) and int(value) != int(text):
+        raise RecordError(f"{path}:{line}: {name} is {text}, which is above 2^53: a float does not hold it")
     if not math.isfinite(value):
         raise RecordError(f"{path}:{line}: {name} is '{text}', which is no finite number")
     return value

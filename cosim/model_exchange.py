@@ -203,8 +203,8 @@ class ModelExchangeInstance(EventInstance):
         signs = self._indicator_signs()
         due = float(self.event_time[0])
         timed = due <= t + SLACK * h
-        if timed and due > t:
-            self.model.set_time(due)
+        if timed and due >= t - SLACK * h:
+            self.model.set_time(due)  # exactly: t is it to rounding
         elif due < t - SLACK * h and not self.is_late:
             self.is_late = True
             warnings.warn(

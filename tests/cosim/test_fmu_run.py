@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 
-from cosim import FMU, Result, System, simulate
+from cosim import FMU, Input, LinearContinuous, Parameter, Result, State, System, simulate
 from cosim.app import main
 from cosim.blocks import TableSource
-from cosim.errors import DeclarationError, RecordError
+from cosim.errors import DeclarationError, FMUError, RecordError
 from cosim.fmu_scenario import fmu_scenario
 from cosim.input_table import connect_inputs
 from fmus.description import DefaultExperiment
@@ -113,6 +115,7 @@ def test_discrete_inputs_are_held(folder, tmp_path):
         ("time,u\n1,1 1\n0,1 1\n", r"in\.csv:3: time 0 s comes after 1 s"),
         ("time,u,u\n0,1 1,1 1\n", "there are two columns u"),
         ('time,"u\n0,1 1\n', "is no CSV file"),
+        ("time,u\n0,0 9007199254740993\n", r"in\.csv:2: u is 9007199254740993, which is above 2\^53"),
     ],
 )
 def test_files_that_are_no_inputs(folder, tmp_path, text, words):
@@ -156,6 +159,50 @@ def test_the_command_writes_what_it_finds(folder, tmp_path, monkeypatch, capsys)
     wanted = simulate(System({"chain": fmu}), step=0.1, stop=1.0, record=["chain.a"])
     assert kept["metrics"]["peak chain.a[1]"]["value"] == np.abs(wanted["chain.a"][:, 0]).max()
     assert np.array_equal(Result.load("out/chain/result.npz")["chain.a"], wanted["chain.a"])
+
+
+class Mixer(LinearContinuous):
+    """x' = A u, A of shape (2, 3)"""
+
+    A = Parameter(1.0, shape=(2, 3))
+    u = Input(1.0, shape=3)
+    x = State(0.0, shape=2)
+
+    def derivatives(self, t):
+        for i in range(2):
+            self.der_x[i] = 0.0
+            for j in range(3):
+                self.der_x[i] += self.A[i, j] * self.u[j]
+
+
+def test_a_matrix_is_given_row_by_row(tmp_path):
+    path = export(Mixer(), tmp_path / "mixer.fmu", fmi_version="3.0")
+    run = fmu_scenario(path).run
+    result = run(stop=1.0, step=0.5, start=("A=1 2 3, 4 5 6", "u=1 10 100"), record=("x",))
+    assert result["mixer.x"][-1] == pytest.approx([321.0, 654.0], rel=1e-15)
+    with pytest.raises(FMUError, match=r"A = \[1\.0, 2\.0\] is no Float64 of shape \(2, 3\)"):
+        run(stop=1.0, step=0.5, start=("A=1 2",))
+
+
+def test_scheduled_execution_is_refused(tmp_path, capsys):
+    """As of the Clocks of the FMI project: clocks of three kinds, variables that belong to them."""
+    text = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Ticks" instantiationToken="t">
+<ScheduledExecution modelIdentifier="Ticks"/><ModelVariables>
+<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+<Clock name="a" valueReference="1" causality="input" intervalVariability="constant" intervalDecimal="1.0"/>
+<Clock name="b" valueReference="2" causality="input" intervalVariability="countdown"/>
+<Clock name="c" valueReference="3" causality="output" intervalVariability="triggered"/>
+<Int32 name="ticks" valueReference="4" causality="output" variability="discrete" clocks="1"/>
+</ModelVariables><ModelStructure><Output valueReference="3"/><Output valueReference="4"/></ModelStructure>
+</fmiModelDescription>"""
+    with zipfile.ZipFile(tmp_path / "ticks.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+        archive.writestr(f"binaries/{fmpy.platform_tuple}/Ticks{fmpy.sharedLibraryExtension}", b"")
+    with pytest.raises(SystemExit):
+        main(["run", str(tmp_path / "ticks.fmu")])
+    words = "has neither Co-Simulation nor Model Exchange, and Scheduled Execution is not supported"
+    assert words in capsys.readouterr().err
 
 
 def test_an_end_that_the_fmu_asks_for_is_told(folder, tmp_path, monkeypatch, capsys):

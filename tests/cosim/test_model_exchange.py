@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from scipy.integrate import solve_ivp
 
 from cosim import (
     FMU,
@@ -60,7 +61,8 @@ class Stiff(Continuous):
 def plants(tmp_path_factory):
     """Plants with both interfaces."""
     folder = tmp_path_factory.mktemp("plants")
-    return {plant: export(plant(), folder / f"{plant.__name__}.fmu") for plant in (Pole, Stiff)}
+    classes = (Pole, Stiff, VanDerPol)
+    return {plant: export(plant(), folder / f"{plant.__name__}.fmu") for plant in classes}
 
 
 def exchanged(path, **options) -> FMU:
@@ -89,13 +91,33 @@ def test_substeps_are_steps(plants, solver):
     assert coarse["p.y"] == pytest.approx(fine["p.y"][::4], rel=1e-14)
 
 
+class VanDerPol(Continuous):
+    """x' = v, v' = (1 - x^2) v - x"""
+
+    x = State(2.0)
+    v = State(0.0)
+
+    def derivatives(self, t):
+        self.der_x = self.v
+        self.der_v = (1.0 - self.x * self.x) * self.v - self.x
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
-def test_cvode_keeps_its_tolerance(plants, tolerance):
-    """The error is controlled a step, with weight 1 + y: some 150 steps in all; errors grow by y(0.5)^2."""
-    fmu = exchanged(plants[Pole], solver="cvode", tolerance=tolerance)
-    result = simulate(System({"p": fmu}), step=0.1, stop=0.5)
-    error = abs(result["p.y"] - 1.0 / (1.0 - result.time)).max()
-    assert tolerance < error < 3.0 * 150.0 * 4.0 * tolerance
+def test_cvode_keeps_its_tolerance_over_many_restarts(plants, tolerance):
+    """500 communication points, at each of which it starts anew at order one.
+
+    30 times what is asked for: errors grow on the steep parts of the cycle. Controlled to
+    `tolerance` itself, the internal steps would leave 2e-3 at 1e-6.
+    """
+    fmu = exchanged(plants[VanDerPol], solver="cvode", tolerance=tolerance)
+    result = simulate(System({"p": fmu}), step=0.02, stop=10.0)
+
+    def slope(t, y):
+        return [y[1], (1.0 - y[0] ** 2) * y[1] - y[0]]
+
+    wanted = solve_ivp(slope, (0.0, 10.0), [2.0, 0.0], "DOP853", rtol=1e-12, atol=1e-13, t_eval=result.time)
+    error = np.abs(result["p.x"] - wanted.y[0]).max()
+    assert 0.01 * tolerance < error < 30.0 * tolerance
 
 
 def test_a_stiff_plant_with_held_inputs(plants):
@@ -104,8 +126,8 @@ def test_a_stiff_plant_with_held_inputs(plants):
     system = System({"r": Ramp(), "p": exchanged(plants[Stiff], solver="cvode")}, links)
     result = simulate(system, step=0.01, stop=0.5)
     held = 2.0 + 3.0 * result.time[:-1]
-    assert result["p.y"][1:] == pytest.approx(held, abs=1e-5)
-    assert result["p.z"] == pytest.approx(np.exp(-result.time), abs=2e-4)
+    assert result["p.y"][1:] == pytest.approx(held, abs=1e-7)
+    assert result["p.z"] == pytest.approx(np.exp(-result.time), abs=1e-6)
     system = System({"r": Ramp(), "p": exchanged(plants[Stiff], solver="ode4")}, links)
     with pytest.raises(SimulationError, match=r"p\.y|p failed"):
         simulate(system, step=0.01, stop=0.5)
@@ -113,7 +135,7 @@ def test_a_stiff_plant_with_held_inputs(plants):
 
 def test_a_long_step_is_no_failure_of_the_solver(plants):
     """A single communication step that takes CVODE more than the 500 internal steps it stops at by itself."""
-    fmu = exchanged(plants[Pole], solver="cvode", tolerance=1e-13)
+    fmu = exchanged(plants[Pole], solver="cvode", tolerance=1e-10)
     result = simulate(System({"p": fmu}), step=0.999, stop=0.999)
     assert result["p.y"][-1] == pytest.approx(1000.0, rel=1e-6)  # errors grow by y^2
 
@@ -152,9 +174,7 @@ def test_a_bouncing_ball_against_its_closed_form(path):
     """Seven bounces, then rest. A bounce at the end of the step would be 0.03 s late, h off by as much."""
     result = simulate(System({"b": FMU(path)}), step=0.03, stop=6.0)
     wanted = [height(t) for t in result.time]
-    assert result["b.h"] == pytest.approx(wanted, abs=1e-3)  # 1e-6 an internal step, some thousand of them
-    close = simulate(System({"b": FMU(path, tolerance=1e-10)}), step=0.03, stop=3.0)
-    assert close["b.h"] == pytest.approx(wanted[: len(close.time)], abs=1e-6)
+    assert result["b.h"] == pytest.approx(wanted, abs=2e-6)
     assert result["b.bounces"][-1] == 7.0
     assert result["b.h"][-1] == result["b.v"][-1] == 0.0
     late = simulate(System({"b": FMU(path, solver="ode4")}), step=0.03, stop=3.0)
