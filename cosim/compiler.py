@@ -14,6 +14,7 @@ import os
 import re
 import sys
 import tempfile
+import threading
 import types
 from collections.abc import Callable, Mapping
 from functools import lru_cache
@@ -327,20 +328,22 @@ def _lower_kernels(participant: Participant) -> str:
 # ----------------------------------------------------------------------- loading
 
 _engines: dict[str, Any] = {}
+_engines_lock = threading.Lock()  # an engine that a second thread replaced would take its code with it
 
 
 def load(ir: str) -> Callable[[str], int]:
     """Compile IR for this machine; return a function that gives the address of a symbol."""
     key = hashlib.sha256(ir.encode()).hexdigest()
-    if key not in _engines:
-        _target_machine()
-        features = llvm.get_host_cpu_features().flatten()
-        machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True
-        )
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(ir), machine)
-        engine.finalize_object()
-        _engines[key] = engine
+    with _engines_lock:
+        if key not in _engines:
+            _target_machine()
+            features = llvm.get_host_cpu_features().flatten()
+            machine = llvm.Target.from_default_triple().create_target_machine(
+                cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True
+            )
+            engine = llvm.create_mcjit_compiler(llvm.parse_assembly(ir), machine)
+            engine.finalize_object()
+            _engines[key] = engine
     address: Callable[[str], int] = _engines[key].get_function_address
     return address
 

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -26,6 +27,7 @@ from .variables import Array
 if TYPE_CHECKING:
     from .fmu import FMU
 
+_LOADING = Lock()
 _LABELS = {1: "warning", 2: "discard", 3: "error", 4: "fatal", 5: "pending"}
 
 
@@ -94,7 +96,7 @@ class Adapter(ABC):
         try:
             with ctrl_c(failures):
                 self._load(library, failures)
-                self.attempt("instantiate", self._instantiate)
+                self._make()
             if failures.interrupted:
                 raise KeyboardInterrupt
         except BaseException:
@@ -108,8 +110,8 @@ class Adapter(ABC):
                 self.process = Isolation(self.name, library, failures)
                 # which FMPy joins to the folder of binaries: of an absolute path nothing else remains
                 identifier = str(support_library().with_suffix(""))
-            # FMPy goes to the library's folder and stays there when it does not load
-            with chdir(self.fmu.directory):
+            # FMPy goes to the library's folder, of which a process has one, and stays there if it fails
+            with _LOADING, chdir(self.fmu.directory):
                 self.api: Any = self._class(self.model_exchange)(
                     guid=self.fmu.description.guid,
                     unzipDirectory=str(self.fmu.directory),
@@ -118,6 +120,19 @@ class Adapter(ABC):
                 )
         except Exception as error:  # FMPy raises bare Exception when a library does not load
             raise FMUError(f"{self.name}: the binary of {self.fmu.path} cannot be loaded: {error}") from error
+
+    def _make(self) -> None:
+        """Instantiate the FMU."""
+        try:
+            self.attempt("instantiate", self._instantiate)
+        except FMUError as error:
+            if not self.interface.needsExecutionTool:
+                raise
+            tool = self.fmu.description.generationTool or "which it does not name"
+            raise FMUError(
+                f"{error}\n{self.fmu.path.name} needs its tool ({tool}) to run, which has to be installed on "
+                "this machine, with a licence if it needs one"
+            ) from error
 
     def function(self, name: str) -> Any:
         """Return a function of FMI for the loop."""

@@ -20,6 +20,7 @@ import numpy as np
 
 from .archive import Archive
 from .clocks import clocks_of
+from .display_units import without_units
 from .errors import FMUError, did_you_mean
 from .fmi import Adapter
 from .fmi2 import Fmi2
@@ -45,8 +46,9 @@ class FMU:
     path
         the .fmu file
     start
-        values of parameters, inputs or start values by variable name; structural parameters
-        (FMI 3.0) change the shapes of the arrays that they size
+        values of parameters, inputs or start values by variable name: numbers in the unit of
+        the variable, or text with another unit, "2 kN/m"; structural parameters (FMI 3.0)
+        change the shapes of the arrays that they size; of a clock, its interval in s
     interface
         "CoSimulation" or "ModelExchange", where the FMU has both; None is Co-Simulation if
         it is there, and Model Exchange under stage coupling
@@ -252,6 +254,8 @@ class FMU:
             port = joined.get(name) or next(iter(self._ports([self.variables[name]]).values()))
             kind = port.variables[0].type
             number = self.adapter.NUMBERS[kind][1] if kind in self.adapter.NUMBERS else None
+            if number is not None and number.is_float:
+                value = without_units(self.path.name, port, self.description.unitDefinitions, value)
             try:
                 plain = np.asarray(value, dtype=object if number is None else None)
                 if plain.shape == (port.size,):  # a matrix may be given row by row, as FMI has it

@@ -36,6 +36,13 @@ class FMUPort:
     variables: tuple[Any, ...]
 
     @property
+    def relative(self) -> bool:
+        """Tell whether it is a difference, whose unit has no offset."""
+        v = self.variables[0]
+        own = v.relativeQuantity
+        return bool(own if own is not None or v.declaredType is None else v.declaredType.relativeQuantity)
+
+    @property
     def size(self) -> int:
         """The number of values."""
         return math.prod(self.shape)
@@ -61,6 +68,13 @@ def unit_of(variable: Any) -> str | None:
     """Return the unit of one of FMPy's variables, its own or its declared type's."""
     declared = variable.declaredType
     unit = variable.unit or (declared.unit if declared is not None else None)
+    return str(unit) if unit else None
+
+
+def display_unit_of(variable: Any) -> str | None:
+    """Return the unit in which a variable is to be shown, its own or its declared type's."""
+    declared = variable.declaredType
+    unit = variable.displayUnit or (declared.displayUnit if declared is not None else None)
     return str(unit) if unit else None
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .archive import Archive
-from .fmu_ports import unit_of
+from .fmu_ports import display_unit_of, unit_of
 from .model_description import description_of, parse
 from .scenario import aligned
 
@@ -72,6 +72,7 @@ def _row(variable: Any) -> dict[str, Any]:
         "type": variable.type + (f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""),
         "causality": variable.causality or "local",
         "unit": unit_of(variable) or "-",
+        "display": display_unit_of(variable) or "-",
         "start": variable.start if variable.start is not None else "-",
         "meaning": variable.description or "",
     }

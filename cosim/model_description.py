@@ -15,6 +15,7 @@ from typing import Any
 from lxml import etree
 
 from .archive import Archive
+from .display_units import display_units
 from .errors import FMUError
 
 _LISTS = ("dependencies", "dependenciesKind", "clocks")
@@ -94,6 +95,8 @@ def _validated(archive: Archive, root: Any) -> Any:
 
 def _complete(root: Any, description: Any) -> None:
     """Read what FMPy's object has a place for and FMPy does not read."""
+    for unit, element in zip(description.unitDefinitions, root.iterfind("UnitDefinitions/Unit"), strict=True):
+        unit.displayUnits = display_units(element)
     elements: dict[str, Any] = {}
     for element in root.iterfind("ModelVariables/*"):
         names = [element.get("name"), *(alias.get("name") for alias in element.iterfind("Alias"))]

@@ -12,6 +12,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from .errors import RecordError, WiringError, did_you_mean
+from .units import conversion
 from .variables import Array
 
 if TYPE_CHECKING:
@@ -87,6 +88,17 @@ class Result:
         if name not in self.signals:
             raise WiringError(f"the result has no signal '{name}'" + did_you_mean(name, self.signals))
         return self.signals[name]
+
+    def in_unit(self, name: str, unit: str) -> Array:
+        """Return a signal in another unit, such as `result.in_unit("plant.x", "mm")`."""
+        values, own = self[name], self.units.get(name)
+        if own is None:
+            raise WiringError(f"{name} has no unit that could be converted to '{unit}'")
+        try:
+            scale, offset = conversion(own, unit)
+        except WiringError as error:
+            raise WiringError(f"{name} in {own}: {error}") from error
+        return scale * values + offset
 
     def __contains__(self, name: object) -> bool:
         return name in self.signals

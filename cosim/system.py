@@ -160,6 +160,8 @@ class System:
                 raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
         try:
             scale, offset = transformation or conversion(out.unit, into.unit)
+            if transformation is None and (self._is_relative(out) or self._is_relative(into)):
+                offset = 0.0
         except WiringError as error:
             raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
         if not (math.isfinite(scale) and math.isfinite(offset)):
@@ -185,6 +187,13 @@ class System:
         except WiringError:
             self.text_connections.pop()
             raise
+
+    def _is_relative(self, port: Port) -> bool:
+        """Tell whether a port is a difference, such as one of temperatures, whose unit has no offset."""
+        member = self.participants[port.participant]
+        if not isinstance(member, FMU):
+            return False
+        return (member.input_ports.get(port.name) or member.output_ports[port.name]).relative
 
     def port(self, text: str, direction: str) -> Port:
         """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
