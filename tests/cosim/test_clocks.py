@@ -39,7 +39,9 @@ def test_periodic_clocks(path):
     last = 2 * ticks(2, 1) - 1  # the point of the last tick
     assert list(result["m.sampled"]) == [result["r.u"][i] if i >= 0 else 0.0 for i in last]
     assert "m: discrete inputs and clocks (Python callback)" in result.schedule
-    result = simulate(System({"m": FMU(path, start={"tick": "750 ms", "own_period": 2.0})}), step=H, stop=20 * H)
+    result = simulate(
+        System({"m": FMU(path, start={"tick": "750 ms", "own_period": 2.0})}), step=H, stop=20 * H
+    )
     assert list(result["m.ticks"]) == list(ticks(3))
     assert list(result["m.owns"]) == list(ticks(8, 4))
     result = simulate(System({"m": FMU(path)}), step=H, start=10.0, stop=10.0 + 20 * H)
@@ -130,3 +132,20 @@ def test_clocks_that_are_refused(path, tmp_path):
         FMU(path, start={"tick": "fast"})
     with pytest.raises(FMUError, match=r"clock own has no interval, .* give one: start=\{'own': 0\.01\}"):
         simulate(System({"m": FMU(path, start={"own_period": -1.0})}), step=H, stop=5.0)
+
+
+def test_an_isolated_fmu_has_the_same_clocks_events_and_texts(path):
+    results = []
+    for isolated in (False, True):
+        start = {"word": "here", "data": b"\x01\x00", "kick_by": 2.0}
+        system = System({n: FMU(path, isolated=isolated, start=start) for n in ("a", "b")})
+        for source, target in (("wrap", "kick"), ("echo", "word"), ("reversed", "data")):
+            system.connect(f"a.{source}", f"b.{target}")
+        record = ["b.echo", "b.reversed", "b.kicked", "b.samples", "b.wrapped_at", "b.wrap"]
+        results.append(simulate(system, step=H, stop=20 * H, record=record))
+    one, other = results
+    assert one.texts == other.texts
+    assert one.texts["b.reversed"][-1] == b"\x01\x00"
+    assert one["b.wrapped_at"][-1] == 5.0
+    for name in one.signals:
+        assert list(one[name]) == list(other[name]), name
