@@ -165,7 +165,7 @@ class Mixer(LinearContinuous):
     """x' = A u, A of shape (2, 3)"""
 
     A = Parameter(1.0, shape=(2, 3))
-    u = Input(1.0, shape=3)
+    u = Input(shape=3)
     x = State(0.0, shape=2)
 
     def derivatives(self, t):
