@@ -1,4 +1,4 @@
-"""The command line: cosim list, run, table, export, inspect.
+"""The command line: cosim list, run, table, export, inspect, doctor.
 
 The outermost layer: it alone may import scenarios, controllers and fmus, and does so
 when a command needs them. Options of a scenario are the keyword arguments of its
@@ -245,6 +245,34 @@ def inspect_fmu(fmu: Path) -> None:
     from .inspection import inspection
 
     print(inspection(fmu))
+
+
+@_app.command
+def doctor(
+    fmu: Path, *, json: bool = False, probe: tuple[str, ...] = (), time_limit: float | None = None
+) -> None:
+    """Examine what an FMU really does: validity, reset, state, leaks, feedthrough, step size, misuse.
+
+    The exit code is that of the worst finding: 0 ok or notes, 1 warnings, 2 errors (as of wrong
+    options, which print no report), 3 a crash or a hang.
+
+    Parameters
+    ----------
+    fmu
+        the .fmu file
+    json
+        print the report as JSON
+    probe
+        a probe to run, such as reset; may be repeated [all]
+    time_limit
+        seconds that a probe may take [60]
+    """
+    from .doctor import examine
+    from .doctor.examination import TIME_LIMIT
+
+    report = examine(fmu, only=probe or None, time_limit=time_limit or TIME_LIMIT)
+    print(report.json() if json else report.text())
+    sys.exit(report.exit_code)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -138,6 +139,14 @@ def write_fmu(path: Path, description: str, name: str, *sources: str) -> Path:
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
         archive.writestr(f"binaries/{folder}/{name}{fmpy.sharedLibraryExtension}", library(*sources))
+    return path
+
+
+def changed(path: Path, source: Path, change: Callable[[str, bytes], bytes]) -> Path:
+    """An FMU of another one's files, each through `change(name, content)`."""
+    with zipfile.ZipFile(source) as original, zipfile.ZipFile(path, "w") as written:
+        for name in original.namelist():
+            written.writestr(name, change(name, original.read(name)))
     return path
 
 

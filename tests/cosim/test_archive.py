@@ -21,7 +21,7 @@ from cosim.errors import FMUError
 from fmus.export import export
 
 from .parts import Ramp
-from .probe import description2, description3, probe
+from .probe import changed, description2, description3, probe
 
 LIBRARY = f"binaries/{fmpy.platform}/probe{fmpy.sharedLibraryExtension}"
 VERSIONS = ["2.0", "3.0"]
@@ -323,14 +323,6 @@ def test_names_that_look_like_elements(tmp_path, names, expected):
 
 
 # ------------------------------------------------------------------------------ binaries
-
-
-def changed(path: Path, source: Path, change) -> Path:
-    """An FMU of another one's files, each through `change(name, content)`."""
-    with zipfile.ZipFile(source) as original, zipfile.ZipFile(path, "w") as written:
-        for name in original.namelist():
-            written.writestr(name, change(name, original.read(name)))
-    return path
 
 
 @pytest.mark.parametrize("version", VERSIONS)

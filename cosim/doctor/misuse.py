@@ -1,0 +1,52 @@
+"""Calls that an importer must not make: an error status is the right answer, silence a bad sign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+from typing import Any
+
+from ..fmu import FMU
+from .probes import Doing, Verdict
+from .subject import Subject
+
+
+def _answered(what: str, call: Callable[[], Any], doing: Doing) -> Verdict:
+    doing(what)
+    try:
+        call()
+    except Exception as error:  # FMPy raises FMICallException and bare Exception alike
+        status = str(error).splitlines()[0][:80]
+        return "ok", f"refused ({status})"
+    return "warning", f"taken without a word: {what}"
+
+
+def step_before_initialization(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
+    """doStep right after instantiation."""
+    doing("instantiate")
+    subject = Subject(fmu, model_exchange)
+    plan = subject.plan
+    return _answered(
+        "do a step before initialization", lambda: subject.api.doStep(plan.start, plan.step, False), doing
+    )
+
+
+def negative_step(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
+    """A step back in time."""
+    subject = Subject(fmu, model_exchange)
+    subject.start()
+    subject.run(3)
+    h = subject.plan.step
+    back = subject.plan.start + 3 * h
+    return _answered(f"do a step of {-h:g} s", lambda: subject.api.doStep(back, -h, False), doing)
+
+
+def unknown_reference(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
+    """Get a variable that is not there."""
+    subject = Subject(fmu, model_exchange)
+    subject.start()
+    known = {v.valueReference for v in fmu.variables.values()}
+    reference = next(r for r in count(3_000_000_000) if r not in known)
+    access = "Real" if fmu.description.fmiVersion == "2.0" else "Float64"
+    getter = getattr(subject.api, f"get{access}")
+    return _answered(f"get value reference {reference}", lambda: getter([reference]), doing)
