@@ -40,6 +40,8 @@ HARMLESS = 256 * 2**20
 MAX_RATIO = 250
 #: bytes left free on the disk
 RESERVE = 256 * 2**20
+#: characters of a path; systems have 4096 and less, and a thousand nested folders are not removed again
+MAX_PATH = 1024
 #: bytes of an XML file; a million variables take some 300 MB
 MAX_XML = 2**30
 
@@ -208,6 +210,8 @@ def _fault(entry: zipfile.ZipInfo) -> str | None:
             "is no path inside the FMU (empty, a slash at the start, a backslash, a colon, or NUL); "
             "pack it with forward slashes and relative paths"
         )
+    if len(name) > MAX_PATH:
+        return f"is a path of {len(name):,} characters, more than {MAX_PATH:,}; shorten it"
     if ".." in name.split("/"):
         return "leads out of the folder that it is unpacked to"
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
