@@ -46,12 +46,7 @@ def clocks_of(where: str, variables: Iterable[Any], start: Mapping[str, Any]) ->
         if v.type != "Clock":
             continue
         clock = Clock(
-            v.name,
-            v.valueReference,
-            v.causality != "input",
-            v.intervalVariability,
-            _seconds(v.intervalCounter, v.resolution, v.intervalDecimal),
-            _seconds(v.shiftCounter, v.resolution, v.shiftDecimal) or 0.0,
+            v.name, v.valueReference, v.causality != "input", v.intervalVariability, *interval_of(v)
         )
         name = f"{where}: clock {v.name}"
         if v.dimensions:
@@ -69,6 +64,13 @@ def clocks_of(where: str, variables: Iterable[Any], start: Mapping[str, Any]) ->
             )
         found[v.name] = clock
     return found
+
+
+def interval_of(variable: Any) -> tuple[float | None, float]:
+    """Return interval and shift of a clock, in s, as the model description has them."""
+    v = variable
+    interval = _seconds(v.intervalCounter, v.resolution, v.intervalDecimal)
+    return interval, _seconds(v.shiftCounter, v.resolution, v.shiftDecimal) or 0.0
 
 
 def _seconds(count: int | None, resolution: int | None, decimal: float | None) -> float | None:

@@ -51,6 +51,12 @@ def display_units(unit: Any) -> list[DisplayUnit]:
     ]
 
 
+def has_unit(text: str) -> bool:
+    """Tell whether a text is a number with a unit."""
+    match = _VALUE.fullmatch(text)
+    return bool(match and re.match(r"[^\d\s.,+-]", match[2]))
+
+
 def without_units(where: str, port: FMUPort, units: Iterable[Any], value: Any) -> Any:
     """Return a start value with texts such as "30 deg" turned into numbers in the port's unit.
 

@@ -3,8 +3,8 @@
     plant = FMU("plant.fmu", start={"m": 2.0})
 
 Arrays are ports with a shape (fmu_ports.py). Variables of all numeric types are ports, floats
-to the system; strings and binary data are start values only. What depends on the version of
-FMI is in fmi2.py and fmi3.py.
+to the system; so are clocks (clocks.py), and strings and binary data (text_ports.py). What
+depends on the version of FMI is in fmi2.py and fmi3.py.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ due. Clocked variables are set and got while their clock is active.
 from __future__ import annotations
 
 import ctypes
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -148,7 +149,7 @@ class EventInstance(FMUInstance):
             ticked = [ref for ref, ticks_now in zip(references, ticks, strict=True) if ticks_now]
             active.update(ticked)
             for x in self.outputs:
-                if x.is_clock:
+                if x.is_clock and ticked:
                     x.told[np.isin(x.references, ticked)] = 1.0
         for x in self.inputs:
             if x.clocks & active and self.used & x.addresses.keys():
@@ -158,10 +159,10 @@ class EventInstance(FMUInstance):
                 self._get_now(x, t)
 
     def _get_now(self, x: Exchange, t: float) -> None:
-        x.raw[:] = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
-        x.values[:] = x.raw
-        wrong = ~np.isfinite(x.values) | (x.values.astype(x.raw.dtype) != x.raw)
-        if wrong.any():
-            what = "is not finite" if x.number.is_float else "is above 2^53, which a float does not hold"
-            name = x.elements[int(wrong.argmax())]
-            raise SimulationError(f"{self.name}.{name} {what} at t = {t:g} s, at a tick of its clock")
+        values = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
+        for name, value in zip(x.elements, values, strict=True):
+            if not (math.isfinite(value) if x.number.is_float else abs(value) <= 2**53):
+                what = "is not finite" if x.number.is_float else "is above 2^53, which a float does not hold"
+                raise SimulationError(f"{self.name}.{name} {what} at t = {t:g} s, at a tick of its clock")
+        x.raw[:] = values
+        x.values[:] = values

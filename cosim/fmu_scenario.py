@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .display_units import has_unit
 from .errors import FMUError, TimeError, did_you_mean
 from .fmu import FMU, Interface, Solver
 from .input_table import connect_inputs
@@ -32,12 +33,19 @@ def fmu_scenario(path: Path) -> Scenario:
         solver: Solver | None = None,
         substeps: int = 1,
         tolerance: float | None = None,
+        event_mode: bool | None = None,
         input: Path | None = None,
         start: tuple[str, ...] = (),
     ) -> System:
         values = _start_values(FMU(path), start) if start else {}
         fmu = FMU(
-            path, start=values, interface=interface, solver=solver, substeps=substeps, tolerance=tolerance
+            path,
+            start=values,
+            interface=interface,
+            solver=solver,
+            substeps=substeps,
+            tolerance=tolerance,
+            event_mode=event_mode,
         )
         system = System({name: fmu})
         if input is not None:
@@ -53,6 +61,7 @@ def fmu_scenario(path: Path) -> Scenario:
         solver: Solver | None = None,
         substeps: int = 1,
         tolerance: float | None = None,
+        event_mode: bool | None = None,
         input: Path | None = None,
         start: tuple[str, ...] = (),
         record: tuple[str, ...] = (),
@@ -76,14 +85,18 @@ def fmu_scenario(path: Path) -> Scenario:
             steps of ode1 to ode4 in a communication step
         tolerance
             relative tolerance of cvode [1e-6]
+        event_mode
+            of Co-Simulation: handle events at their instants [where the FMU has clocks]
         input
             CSV file: time and inputs by name; linear for continuous inputs, held for others
         start
-            name=value of a parameter or start value, arrays as "1 2 3"; may be repeated
+            name=value of a parameter or start value, with a unit ("30 deg") if it is another one than the
+            variable's; arrays as "1 2 3"; may be repeated
         record
             variable to record; may be repeated [all outputs]
         """
         options = {"interface": interface, "solver": solver, "substeps": substeps, "tolerance": tolerance}
+        options["event_mode"] = event_mode
         system = build(**options, input=input, start=start)  # type: ignore[arg-type]
         fmu = system.participants[name]
         assert isinstance(fmu, FMU)
@@ -167,7 +180,9 @@ def _value(name: str, kind: str, text: str) -> Any:
             return text
         if kind == "Binary":
             return bytes.fromhex(text)
-        number = float if kind in ("Real", "Float64", "Float32") else int
+        number = float if kind in ("Real", "Float64", "Float32", "Clock") else int
+        if number is float and has_unit(text):
+            return text
         values = [
             _TRUTH[t.lower()] if t.lower() in _TRUTH else number(t) for t in text.replace(",", " ").split()
         ]

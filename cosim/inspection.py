@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .archive import Archive
+from .clocks import interval_of
 from .fmu_ports import display_unit_of, unit_of
 from .model_description import description_of, parse
 from .scenario import aligned
@@ -72,7 +73,16 @@ def _row(variable: Any) -> dict[str, Any]:
         "type": variable.type + (f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""),
         "causality": variable.causality or "local",
         "unit": unit_of(variable) or "-",
+        "start": _start(variable),
         "display": display_unit_of(variable) or "-",
-        "start": variable.start if variable.start is not None else "-",
         "meaning": variable.description or "",
     }
+
+
+def _start(variable: Any) -> str:
+    """Return the start value, of a clock when it ticks."""
+    if variable.type != "Clock":
+        return str(variable.start) if variable.start is not None else "-"
+    interval, shift = interval_of(variable)
+    every = "" if interval is None else f", every {interval:g} s" + (f" from {shift:g} s" if shift else "")
+    return f"{variable.intervalVariability}{every}"

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from cosim import FMU, Block, Input, Output, State, System, simulate
-from cosim.errors import FMUError, TimeError, WiringError
+from cosim.errors import FMUError, SimulationError, TimeError, WiringError
+from cosim.inspection import inspection
 
 from .metronome import metronome
 from .parts import Ramp
@@ -132,6 +133,21 @@ def test_clocks_that_are_refused(path, tmp_path):
         FMU(path, start={"tick": "fast"})
     with pytest.raises(FMUError, match=r"clock own has no interval, .* give one: start=\{'own': 0\.01\}"):
         simulate(System({"m": FMU(path, start={"own_period": -1.0})}), step=H, stop=5.0)
+
+
+def test_inspection_shows_when_clocks_tick(path):
+    rows = {line.split()[0]: line for line in inspection(path).splitlines() if line}
+    assert "constant, every 0.5 s from 0.25 s" in rows["sample"]
+    assert "fixed, every 0.25 s" in rows["tick"]
+    assert "triggered" in rows["wrap"]
+
+
+def test_a_clocked_output_that_is_not_finite(path):
+    """kicked = 1e308 + 1e308 at the second tick."""
+    system = System({"r": Ramp(), "m": FMU(path, start={"kick_by": 1e308})}, [("r.u", "m.kick")])
+    words = r"m\.kicked is not finite at t = 0\.25 s, at a tick of its clock"
+    with pytest.raises(SimulationError, match=words):
+        simulate(system, step=H, stop=5.0)
 
 
 def test_an_isolated_fmu_has_the_same_clocks_events_and_texts(path):

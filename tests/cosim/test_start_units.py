@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from cosim import FMU, Block, Input, Output, System, simulate
+from cosim.display_units import DisplayUnit, has_unit, without_units
 from cosim.errors import FMUError, WiringError
+from cosim.fmu_ports import FMUPort
 from cosim.inspection import inspection
 
 from .probe import write_fmu
@@ -115,6 +120,20 @@ def test_texts_that_are_refused(path, start, words):
         FMU(path, start=start)
 
 
+@settings(max_examples=200, deadline=None)
+@given(st.floats(-1e12, 1e12), st.sampled_from(["deg", " deg ", "rad", "\tmrad"]))
+def test_any_number_is_read(number, unit):
+    """repr of a float is read back, with any unit after it, and nothing that is no float is."""
+    units = [SimpleNamespace(name="rad", displayUnits=[DisplayUnit("deg", factor=180.0 / math.pi)])]
+    port = FMUPort("x", (), "rad", "Float64", (SimpleNamespace(relativeQuantity=None, declaredType=None),))
+    factor = {"deg": math.pi / 180.0, "rad": 1.0, "mrad": 1e-3}[unit.strip()]
+    read = without_units("f", port, units, f"{number!r}{unit}")
+    assert read == pytest.approx(number * factor, rel=1e-14)
+    assert has_unit(f"{number!r}{unit}")
+    for text in (f"{number!r} {number!r}", f"{unit}{number!r}", f"{number!r}"):
+        assert not has_unit(text)
+
+
 class Warm(Block):
     """A temperature, and a length."""
 
@@ -151,7 +170,7 @@ def test_a_relative_quantity_has_no_offset_on_a_connection(path):
 
 def test_inspection_shows_display_units(path):
     rows = {line.split()[0]: line.split() for line in inspection(path).splitlines() if line}
-    assert rows["variable"][3:5] == ["unit", "display"]
-    assert rows["angle"][3:5] == ["rad", "deg"]
-    assert rows["typed"][3:5] == ["K", "degC"]
-    assert rows["k"][3:5] == ["N/m", "-"]
+    assert rows["variable"][3:6] == ["unit", "start", "display"]
+    assert rows["angle"][3:6] == ["rad", "0", "deg"]
+    assert rows["typed"][3:6] == ["K", "0", "degC"]
+    assert rows["k"][3:6] == ["N/m", "0", "-"]
