@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .fmi import Adapter
+from .fmi2_log import callbacks
 from .fmu_ports import Shape
 from .opcodes import FMI2_COMPLETED, FMI2_DO_STEP, FMI2_VALUES, NUMBERS, Number
 
@@ -45,17 +45,7 @@ class Fmi2(Adapter):
         return FMU2Model if model_exchange else FMU2Slave
 
     def _instantiate(self) -> None:
-        from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-        from fmpy.logging import addLoggerProxy
-
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = fmi2CallbackLoggerTYPE(
-            lambda _, __, status, category, message: self.note(status, message)
-        )
-        callbacks.allocateMemory = defaultCallbacks.allocateMemory
-        callbacks.freeMemory = defaultCallbacks.freeMemory
-        addLoggerProxy(ctypes.byref(callbacks))
-        self.api.instantiate(callbacks=callbacks, loggingOn=True)
+        self.api.instantiate(callbacks=callbacks(self), loggingOn=True)
 
     def configure(self, values: Mapping[str, Sequence[Any]]) -> None:
         """There are no structural parameters."""

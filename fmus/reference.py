@@ -29,6 +29,7 @@ from fmpy import extract, read_model_description
 from fmpy.simulation import instantiate_fmu
 from lxml import etree
 
+from cosim.fmi2_log import callbacks
 from cosim.participant import Participant
 from cosim.variables import Array
 
@@ -91,6 +92,7 @@ def _run(fmu: Path, interface: str, participant: Participant, time: Array, h: fl
         finally:
             if instance is not None:
                 instance.freeInstance()
+            callbacks()  # FMPy would call `log` for other FMUs, when it is gone
 
 
 def _simulate(

@@ -156,3 +156,28 @@ def test_what_an_fmu_logs_is_part_of_the_error(tmp_path):
     export(Diverges(), path, interfaces=["ModelExchange"], experiment=DefaultExperiment(stop=0.1, step=0.01))
     with pytest.raises(SimulationError, match=r"(?s)plant failed at t = .*fmi2Error.*der\(x\) became inf"):
         simulate(System({"plant": FMU(path)}), step=0.1, stop=9.0, coupling="continuous", solver="ode1")
+
+
+def test_lines_of_the_log_go_to_the_fmu_that_they_come_from(capsys):
+    """FMPy's native proxy has room for one logger; with one for each FMU the last one got everything."""
+    import gc
+
+    from cosim.fmi2_log import callbacks
+
+    class Instance:
+        def __init__(self):
+            self.lines = []
+
+        def note(self, status, message):
+            self.lines.append((status, message))
+
+    a, b = Instance(), Instance()
+    of_a, of_b = callbacks(a), callbacks(b)
+    of_a.logger(of_a.componentEnvironment, b"a", 1, b"", b"of a")
+    of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"of b")
+    assert (a.lines, b.lines) == ([(1, b"of a")], [(3, b"of b")])
+    del b
+    gc.collect()
+    of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"too late")  # an FMU that speaks when it is gone
+    of_a.logger(None, b"another", 1, b"", b"of FMPy")
+    assert capsys.readouterr().out == "[WARNING] of FMPy\n"
