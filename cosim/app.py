@@ -177,7 +177,7 @@ def export(
     step: float | None = None,
     stop: float | None = None,
 ) -> None:
-    """Export a participant of a scenario as a native FMU, or the whole system as an SSP.
+    """Export a participant of a scenario as a native FMU, or the whole system as an SSP or one FMU.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def export(
         scenario:participant, such as chattering:plant or my_scenario.py:controller; a scenario
         alone is the system
     out
-        the file to write [PARTICIPANT.fmu, SCENARIO.ssp]
+        the file to write [PARTICIPANT.fmu, SCENARIO.ssp]; a system as .fmu is a container of FMUs
     platform
         x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, aarch64-darwin; may be repeated
         [this machine]
@@ -222,21 +222,28 @@ def _export_system(
     step: float | None,
     stop: float | None,
 ) -> None:
-    from fmus.ssp import export_ssp
+    if path.suffix == ".ssp":
+        from fmus.ssp import export_ssp
 
-    if path.suffix != ".ssp":
-        raise ScenarioError(
-            f"a system leaves as an .ssp, not as {path}; a participant, SCENARIO:NAME, leaves as an .fmu"
+        export_ssp(
+            system,
+            path,
+            step=step,
+            stop=stop,
+            version=ssp_version,
+            fmi_version=fmi_version,
+            platforms=platforms,
         )
-    export_ssp(
-        system,
-        path,
-        step=step,
-        stop=stop,
-        version=ssp_version,
-        fmi_version=fmi_version,
-        platforms=platforms,
-    )
+    elif path.suffix == ".fmu":
+        from fmus.container import export_container
+
+        if step is None:
+            raise ScenarioError("a container steps what is in it; give its step in seconds, --step 0.01")
+        if platforms:
+            raise ScenarioError("a container is for the machine that makes it, not for --platform")
+        export_container(system, path, step=step, stop=stop, fmi_version=fmi_version or "2.0")
+    else:
+        raise ScenarioError(f"a system leaves as an .ssp, or as an .fmu that holds it all, not as {path}")
 
 
 @_app.command(name="inspect")

@@ -126,6 +126,13 @@ class Units:
                 exponents = tuple(int(getattr(base, n)) for n in BASE_UNITS)
                 self.definitions.setdefault(unit.name, (exponents, float(base.factor), float(base.offset)))
 
+    def attributes(self, name: str) -> dict[str, str]:
+        """Return the attributes of a unit's BaseUnit, in SSP as in FMI."""
+        exponents, factor, offset = self.definitions[name]
+        found = {n: str(e) for n, e in zip(BASE_UNITS, exponents, strict=True) if e}
+        found |= {"factor": repr(factor)} if factor != 1.0 else {}
+        return found | ({"offset": repr(offset)} if offset != 0.0 else {})
+
     def convert(self, source: str | None, target: str | None) -> tuple[float, float]:
         """Return (factor, offset) with `value in target = factor * value in source + offset`."""
         if source is None or target is None or source == target:

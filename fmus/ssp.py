@@ -16,11 +16,8 @@ step later than it is in this system. README, "Systems out and in".
 
 from __future__ import annotations
 
-import hashlib
 import os
-import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -28,16 +25,11 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from cosim.errors import CosimError
-from cosim.fmi2 import Fmi2
-from cosim.fmi3 import Fmi3
 from cosim.fmu import DEFAULT_TOLERANCE, FMU
-from cosim.fmu_ports import FMUPort, Shape, ports, unit_of
-from cosim.model_description import read_description
+from cosim.fmu_ports import FMUPort, unit_of
 from cosim.participant import Block
 from cosim.ssp_format import (
     ANNOTATION,
-    BASE_UNITS,
     FMU_TYPE,
     NAMESPACES,
     OWN,
@@ -53,29 +45,13 @@ from cosim.ssp_format import (
 )
 from cosim.system import Connection, Member, Port, System
 
-from .export import export, write_archive
+from .export import write_archive
 from .link import ExportError
+from .parts import Part, fmu_parts
 
 PARAMETER_SET = "parameters"  # one name for all: tools apply sets by name
 #: what ecos and libcosim read
 _OSP = ("com.opensimulationplatform", "http://opensimulationplatform.com/SSP/OSPAnnotations")
-
-
-@dataclass
-class _Part:
-    """A participant, its FMU file, and what the file declares."""
-
-    name: str
-    member: Member
-    file: bytes
-    description: Any
-    source: str = ""
-    ports: dict[str, FMUPort] = field(default_factory=dict)
-
-    def shape(self, variable: Any) -> Shape:
-        """Return the shape of a variable of the FMU."""
-        adapter = Fmi2 if self.description.fmiVersion.startswith("2") else Fmi3
-        return adapter.shape(variable, self.member.start if isinstance(self.member, FMU) else {})
 
 
 def export_ssp(
@@ -108,14 +84,14 @@ def export_ssp(
         raise SSPError(f"{texts.source} -> {texts.target} is text, which is not written to an SSP yet")
     fmi_version = fmi_version or ("3.0" if version == "2.0" else "2.0")
     wanted = None if platforms is None else list(platforms)
-    parts = _parts(system, fmi_version, wanted)
+    parts = fmu_parts(system, fmi_version, wanted)
     needs = _needs_2(system, parts)
     if version == "1.0" and needs:
         raise SSPError(f"SSP 1.0 cannot say that {needs}; write version 2.0, or FMUs of FMI 2.0")
     writer = _Writer(system, parts, version or ("2.0" if needs else "1.0"))
     target = Path(path)
     text = writer.document(target.stem, start, stop, step)
-    files = {part.source: part.file for part in parts.values()}
+    files = {f"resources/{part.source}": part.file for part in parts.values()}
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_archive(target, {ROOT: text, **files}, first=ROOT)
@@ -124,31 +100,7 @@ def export_ssp(
     return target
 
 
-def _parts(system: System, fmi_version: str, platforms: list[str] | None) -> dict[str, _Part]:
-    """Export or read every participant's FMU; the same file goes in once."""
-    parts: dict[str, _Part] = {}
-    sources: dict[bytes, str] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, member in system.participants.items():
-            if isinstance(member, FMU):
-                file = member.path
-            else:
-                file = Path(folder) / f"{name}.fmu"
-                try:
-                    export(member, file, fmi_version=fmi_version, platforms=platforms)
-                except CosimError as error:
-                    raise type(error)(f"participant {name}: {error}") from error
-            part = _Part(name, member, file.read_bytes(), read_description(file))
-            part.source = sources.setdefault(hashlib.sha256(part.file).digest(), f"resources/{name}.fmu")
-            if isinstance(member, FMU):
-                part.ports = member.input_ports | member.output_ports
-            else:
-                part.ports = ports(part.description.modelVariables, part.shape)
-            parts[name] = part
-    return parts
-
-
-def _needs_2(system: System, parts: dict[str, _Part]) -> str:
+def _needs_2(system: System, parts: dict[str, Part]) -> str:
     """Return what SSP 1.0 has no words for, as the end of a sentence; nothing if it has."""
     for c in system.connections:
         for end in (c.source, c.target):
@@ -171,7 +123,7 @@ def _needs_2(system: System, parts: dict[str, _Part]) -> str:
 class _Writer:
     """Writes SystemStructure.ssd."""
 
-    def __init__(self, system: System, parts: dict[str, _Part], version: str) -> None:
+    def __init__(self, system: System, parts: dict[str, Part], version: str) -> None:
         self.system = system
         self.parts = parts
         self.version = version
@@ -203,9 +155,10 @@ class _Writer:
 
     # ---------------------------------------------------------------------- components
 
-    def _component(self, elements: etree._Element, part: _Part) -> None:
+    def _component(self, elements: etree._Element, part: Part) -> None:
         member = part.member
-        component = _add(elements, SSD, "Component", name=part.name, type=FMU_TYPE, source=part.source)
+        source = f"resources/{part.source}"
+        component = _add(elements, SSD, "Component", name=part.name, type=FMU_TYPE, source=source)
         if isinstance(member, FMU) and member.interface is not None:
             component.set("implementation", member.interface)
         connectors = self._connectors(part)
@@ -223,7 +176,7 @@ class _Writer:
                 hint = etree.SubElement(note, f"{{{_OSP[1]}}}StepSizeHint")
                 hint.set("value", facts["samplePeriod"])
 
-    def _connectors(self, part: _Part) -> dict[str, tuple[FMUPort, str]]:
+    def _connectors(self, part: Part) -> dict[str, tuple[FMUPort, str]]:
         """Return all outputs, and the inputs and local variables that are connected."""
         used = {
             end.name
@@ -252,7 +205,7 @@ class _Writer:
             for n in port.shape:
                 _add(connector, SSC, "Dimension", size=str(n))
 
-    def _parameters(self, component: etree._Element, part: _Part) -> None:
+    def _parameters(self, component: etree._Element, part: Part) -> None:
         """Write the parameter set of a component: parameters of ours, start values of an FMU."""
         values = _values(part)
         if not values:
@@ -339,12 +292,8 @@ class _Writer:
     def _add_units(self, parent: etree._Element, prefix: str, units: set[str]) -> None:
         section = _add(parent, prefix, "Units") if units else None
         for name in sorted(units):
-            exponents, factor, offset = self.definitions.definitions[name]
-            attributes = {n: str(e) for n, e in zip(BASE_UNITS, exponents, strict=True) if e}
-            attributes |= {"factor": repr(factor)} if factor != 1.0 else {}
-            attributes |= {"offset": repr(offset)} if offset != 0.0 else {}
             unit = _add(section, SSC, "Unit", name=name)
-            etree.SubElement(unit, tag(SSC, "BaseUnit"), attributes)
+            etree.SubElement(unit, tag(SSC, "BaseUnit"), self.definitions.attributes(name))
 
     def _experiment(self, root: etree._Element, start: float, stop: float | None, step: float | None) -> None:
         if stop is None and step is None:
@@ -387,7 +336,7 @@ def _facts(member: Member) -> dict[str, str]:
     return facts
 
 
-def _values(part: _Part) -> list[tuple[Any, list[Any]]]:
+def _values(part: Part) -> list[tuple[Any, list[Any]]]:
     """Return variables of an FMU with the values of its parameter set."""
     variables = {v.name: v for v in part.description.modelVariables}
     if isinstance(part.member, FMU):

@@ -142,6 +142,19 @@ def test_a_file_that_does_not_say_how_it_is_run(folder, capsys):
     assert call("run", "bare.ssp") == 0
 
 
+def test_a_system_as_one_fmu(folder, capsys):
+    """At t_k the container gives the velocity that the scenario has at t_k."""
+    text = SCENARIO.replace("sample_period=0.02", "sample_period=0.01")
+    (folder / "even.py").write_text(text)
+    assert call("export", "even.py", "--out", "even.fmu", "--fmi-version", "3.0") == 0
+    assert call("run", "even.fmu", "--out", "whole") == 0
+    assert call("run", "even.py", "--out", "ref") == 0
+    whole, expected = (Result.load(folder / n / "result.npz") for n in ("whole", "ref"))
+    assert np.array_equal(whole["even.mass.v"], expected["mass.v"])
+    assert call("export", "braking.py", "--out", "loop.fmu") == 2
+    assert "brake acts every 0.02 s and the container steps all FMUs every 0.01 s" in capsys.readouterr().err
+
+
 def test_an_export_to_something_else_is_refused(folder, capsys):
     assert call("export", "braking.py", "--out", "loop.zip") == 2
     assert "a system leaves as an .ssp" in capsys.readouterr().err
