@@ -81,6 +81,12 @@ def _is_real(fmu: FMU, port: FMUPort) -> bool:
 
 # ------------------------------------------------------------------------- its instances
 
+ONCE: Verdict = ("note", "not tried: only one instance in a process, as declared")
+
+
+def _interface(fmu: FMU, model_exchange: bool) -> Any:
+    return fmu.description.modelExchange if model_exchange else fmu.description.coSimulation
+
 
 def instance(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     """The library loads; an instance is made, initialized, moved, terminated and freed."""
@@ -123,19 +129,26 @@ def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     subject = Subject(fmu, model_exchange)
     doing("initialize")
     subject.start()
-    start = subject.read()
+    inputs, start = subject.start_inputs, subject.read()
     doing(f"do {STEPS} steps")
     first = [start, *subject.run()]
     doing("reset")
     subject.reset()
+    kept = [n for n, v in inputs.items() if not same(v, subject.start_inputs[n])]
+    subject.set({n: inputs[n] for n in kept})
+    subject.start_inputs = inputs
     start = subject.read()
     doing(f"do {STEPS} steps after reset")
     second = [start, *subject.run()]
     doing("terminate and free the instance")
     subject.stop()
     changed = difference((first, second), 0)
+    if not changed and kept:
+        return "warning", f"inputs keep their values: {named(kept)}; set again, the run repeats bit for bit"
     if not changed:
         return "ok", f"repeats {STEPS} steps bit for bit"
+    if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
+        return "error", f"the run after reset differs: {changed}"
     doing("repeat the run in a new instance")
     other = Subject(fmu, model_exchange)
     other.start()
@@ -146,7 +159,7 @@ def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     """A state that was got and is set, also by way of bytes and in another instance, repeats the run."""
-    interface = fmu.description.modelExchange if model_exchange else fmu.description.coSimulation
+    interface = _interface(fmu, model_exchange)
     if not interface.canGetAndSetFMUstate:
         return "note", "not declared: it cannot be saved and returned to"
     subject = Subject(fmu, model_exchange)
@@ -188,6 +201,8 @@ def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 def leak(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     """Many instances after each other in one process: memory and handles do not grow."""
+    if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
+        return ONCE
     warm = INSTANCES // 5
     subject = Subject(fmu, model_exchange)
     subject.start()
@@ -213,9 +228,8 @@ def leak(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 def several(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     """The run of an instance is the same when another one runs, with other inputs, in turn."""
-    interface = fmu.description.modelExchange if model_exchange else fmu.description.coSimulation
-    if interface.canBeInstantiatedOnlyOncePerProcess:
-        return "note", "only one in a process, as declared"
+    if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
+        return ONCE
     doing("run one instance")
     alone = Subject(fmu, model_exchange, "alone")
     alone.start()
@@ -293,7 +307,7 @@ def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict
     ]
     unseen = [f"{o} on {i}" for o, i in sorted(pairs) if i not in seen[o]]
     count = sum(map(len, seen.values()))
-    parts = [f"{count} dependencies seen"]
+    parts = [f"{count} dependenc{'y' if count == 1 else 'ies'} seen"]
     if open_ends:
         parts.append(f"no dependencies listed, which means all: {named(open_ends)}")
     if unseen:
@@ -303,6 +317,8 @@ def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict
 
 def step_size(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     """The same run with h and with h / 2, inputs held; compared at the points that both have."""
+    if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
+        return ONCE
     runs: list[list[Values]] = []
     for parts in (1, 2):
         subject = Subject(fmu, model_exchange, f"step{parts}")

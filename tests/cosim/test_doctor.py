@@ -15,7 +15,7 @@ from cosim.errors import CosimError
 from fmus.export import export
 from tests.fmus.host import PARTICIPANTS
 
-from .probe import changed, write_fmu
+from .probe import changed, probe, write_fmu
 
 CS, ME = "Co-Simulation", "Model Exchange"
 VARIABLES = """
@@ -64,9 +64,9 @@ def bad(tmp_path_factory):
     return give
 
 
-def probed(path, probe: str, interface: str) -> tuple[str, str]:
+def probed(path, name: str, interface: str) -> tuple[str, str]:
     """Run a probe in this process, for what does not end it."""
-    planned = next(p for p in PROBES if p.name == probe)
+    planned = next(p for p in PROBES if p.name == name)
     done: list[str] = []
     try:
         return planned.function(FMU(path), interface == ME, done.append)
@@ -93,20 +93,31 @@ def test_an_fmu_of_ours_has_nothing_above_a_note(tmp_path, name, version):
 
 def test_the_model_of_the_faults_has_none_of_itself(bad):
     """So what is found below is the fault's. The step is exact: h and h / 2 differ by rounding."""
-    report = examine(bad("good"))
-    found = {(f.probe, f.interface): (f.level, f.text) for f in report.findings}
-    assert {n: level for n, (level, _) in found.items() if level != "ok"} == {("platforms", ""): "note"}
-    assert set(found) == {("platforms", ""), *((p.name, i) for p in PROBES for i in p.interfaces)}
-    assert found["feedthrough", CS] == found["feedthrough", ME] == ("ok", "1 dependencies seen")
+    planned = [(p.name, i) for p in PROBES for i in p.interfaces]
+    found = {(name, interface): probed(bad("good"), name, interface) for name, interface in planned}
+    assert {level for level, _ in found.values()} == {"ok"}, found
+    assert found["feedthrough", CS] == found["feedthrough", ME] == ("ok", "1 dependency seen")
     assert found["state", CS] == ("ok", "repeats 20 steps bit for bit, also from 64 bytes")
-    assert report.exit_code == 0
+
+
+def test_the_report_is_that_of_the_probes(bad):
+    """In processes of their own: the same words, in the order of the probes."""
+    names = ["description", "reset", "negative step"]
+    report = examine(bad("good"), only=reversed(names))
+    assert [(f.probe, f.interface) for f in report.findings] == [
+        ("platforms", ""), ("description", ""), ("reset", CS), ("negative step", CS), ("reset", ME)
+    ]  # fmt: skip
+    for f in report.findings[1:]:
+        assert (f.level, f.text) == probed(bad("good"), f.probe, f.interface)
+    assert (report.worst, report.exit_code) == ("note", 0)
+    assert report.summary() == "5 probes: 1 note, 4 ok"
 
 
 # --------------------------------------------------------------------------------- faults
 
 
 @pytest.mark.parametrize(
-    ("fault", "probe", "interfaces", "level", "words"),
+    ("fault", "name", "interfaces", "level", "words"),
     [
         ("no instance", "instance", [CS, ME], "error", "failed to instantiate"),
         ("no initialization", "instance", [CS, ME], "error", "failed to enter initialization"),
@@ -115,6 +126,8 @@ def test_the_model_of_the_faults_has_none_of_itself(bad):
         ("derivative not finite", "initial values", [ME], "error", "not finite: derivatives"),
         ("indicator not finite", "initial values", [ME], "error", "not finite: event indicators"),
         ("reset keeps x", "reset", [CS, ME], "error", "reset differs: x by .* step 0; a new instance rep"),
+        ("reset keeps u", "reset", [CS, ME], "warning", "inputs keep their values: u; set again, the run"),
+        ("differs at random", "reset", [CS], "error", "reset differs: x by .*; a new instance differs, too"),
         ("state without x", "state", [CS, ME], "error", "after the state was set differs: x by .* step"),
         ("bytes without x", "state", [CS, ME], "error", "after the state was read from bytes differs: x by"),
         ("leak", "leak", [CS, ME], "warning", r"every instance leaves (19|20|21)\S* KiB of memory"),
@@ -132,15 +145,15 @@ def test_the_model_of_the_faults_has_none_of_itself(bad):
         ("silent", "unknown value reference", [CS, ME], "warning", "taken without a word: get value ref"),
     ],
 )  # fmt: skip
-def test_a_fault_is_found(bad, fault, probe, interfaces, level, words):
+def test_a_fault_is_found(bad, fault, name, interfaces, level, words):
     for interface in interfaces:
-        got, text = probed(bad(fault), probe, interface)
+        got, text = probed(bad(fault), name, interface)
         assert got == level, text
         assert re.search(words, text), text
 
 
 @pytest.mark.parametrize(
-    ("fault", "probe", "interfaces", "words"),
+    ("fault", "name", "interfaces", "words"),
     [
         ("crash at instantiate", "instance", [CS, ME], r"died of SIG\w+; .*: load the library and inst"),
         ("crash at free", "instance", [CS, ME], r"died of SIG\w+; .*: terminate and free the instance"),
@@ -151,9 +164,9 @@ def test_a_fault_is_found(bad, fault, probe, interfaces, level, words):
         ("hang at step", "instance", [CS], "hangs: it did not end within 6 s; it was to: do steps"),
     ],
 )
-def test_what_takes_the_process_with_it_is_found(bad, fault, probe, interfaces, words):
-    report = examine(bad(fault), only=[probe], time_limit=6.0 if "hang" in fault else 60.0)
-    found = {f.interface: f for f in report.findings if f.probe == probe}
+def test_what_takes_the_process_with_it_is_found(bad, fault, name, interfaces, words):
+    report = examine(bad(fault), only=[name], time_limit=6.0 if "hang" in fault else 60.0)
+    found = {f.interface: f for f in report.findings if f.probe == name}
     for interface in interfaces:
         assert found[interface].level == "crashed"
         assert re.search(words, found[interface].text), report.text()
@@ -176,6 +189,13 @@ def test_units_that_are_missing_or_not_known(bad, tmp_path):
     level, words = probed(path, "units", "")
     assert level == "note"
     assert words == "1 of 3 inputs and outputs have none: u; not known, so not converted: furlog"
+
+
+def test_an_fmu_that_can_be_there_once_only_is_left_in_peace(tmp_path):
+    path = probe(tmp_path / "once.fmu", "3.0", once=True)
+    for name in ("leak", "several instances", "step size"):
+        assert probed(path, name, CS) == ("note", "not tried: only one instance in a process, as declared")
+    assert probed(path, "state", CS)[1] == "not declared: it cannot be saved and returned to"
 
 
 # --------------------------------------------------------------------------- command line

@@ -63,7 +63,8 @@ EXPORT fmi2Status fmi2Terminate(P) {
 EXPORT fmi2Status fmi2Reset(P) {
     if (HAS("crash at reset")) CRASH;
     if (!HAS("reset keeps x")) p->x = 0.5;
-    p->u = p->ready = 0;
+    if (!HAS("reset keeps u")) p->u = 0;
+    p->ready = 0;
     return fmi2OK;
 }
 
@@ -142,6 +143,7 @@ EXPORT fmi2Status fmi2DoStep(P, double t, double h, fmi2Boolean no_restore) {
     double *x = HAS("shared") ? &shared : &p->x;
     *x += (p->u - *x) * (HAS("euler") ? h : -expm1(-h));
     if (HAS("extra per step")) *x += 0.1;
+    if (HAS("differs at random")) *x += rand() * 1e-12;
     return fmi2OK;
 }
 
