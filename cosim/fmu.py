@@ -180,6 +180,11 @@ class FMU:
     def _event_mode(self, asked: bool | None) -> bool:
         """Tell whether Co-Simulation uses event mode."""
         clocks = [v.name for v in self.description.modelVariables if v.type == "Clock"]
+        if asked and self.model_exchange:
+            raise FMUError(
+                f"{self.path.name}: event_mode is of Co-Simulation, and Model Exchange, which has it always, "
+                "is used; leave event_mode away"
+            )
         if self.model_exchange or not (asked or clocks):
             return False
         if not self.description.coSimulation.hasEventMode:

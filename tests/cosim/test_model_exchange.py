@@ -24,6 +24,7 @@ from cosim.model_exchange import LateEventWarning
 from fmus.export import export
 
 from .ball import ball, height
+from .counter import counter
 from .parts import Gain, Ramp
 
 FIXED = ["ode1", "ode2", "ode3", "ode4"]
@@ -196,6 +197,27 @@ def test_time_events_are_met_exactly(path, solver, first, period):
     assert list(result["b.level"]) == list((-1.0) ** counts)
 
 
+@pytest.mark.parametrize(
+    ("solver", "coupling", "step"),
+    [
+        *((solver, "sampled", h) for solver in ("ode1", "ode4", "cvode") for h in (0.05, 0.1, 0.2, 0.3)),
+        *((None, "continuous", h) for h in (0.05, 0.1)),
+    ],
+)
+def test_time_events_of_an_fmu_without_states(tmp_path, solver, coupling, step):
+    """The FMU refuses an event that is off by a rounding, and every function that it has no states for.
+
+    Its events are at sums of 0.1, the communication points at products: they differ from k = 6 on.
+    """
+    path = counter(tmp_path / "counter.fmu")
+    assert validate_fmu(str(path)) == []
+    fmu = FMU(path, start={"last": 57}, solver=solver)
+    with pytest.warns(SimulationEndedWarning, match=r"c asked to end the simulation at t = 5\.7 s"):
+        result = simulate(System({"c": fmu}), step=step, stop=6.0, coupling=coupling)
+    assert list(result["c.count"]) == list(np.floor(10.0 * result.time + 1e-9))
+    assert result["c.count"][-1] == (57.0 if step != 0.2 else 56.0)
+
+
 def test_an_input_that_jumps_over_an_indicator_is_an_event_at_once(path):
     """The gust is 0.40, 0.46, 0.52, ...: it passes 0.5 at t_2, which the output shows at t_3."""
     system = System({"r": Ramp(), "g": Gain(K=0.2), "b": FMU(path)}, [("r.u", "g.x"), ("g.u", "b.gust")])
@@ -279,6 +301,11 @@ def test_options_that_make_no_sense(path, plants):
         (path, {"tolerance": 0.0}, r"tolerance=0\.0 is no number from 1e-14 to 1"),
         (path, {"solver": "ode4", "substeps": 0}, "substeps=0 is no whole number"),
         (both, {"interface": "ModelExchange", "as_block": True}, 'interface="ModelExchange" is given'),
+        (
+            both,
+            {"interface": "ModelExchange", "event_mode": True},
+            "event_mode is of Co-Simulation, and Model",
+        ),
     ]:
         with pytest.raises(FMUError, match=words):
             FMU(where, **options)
