@@ -345,8 +345,12 @@ TABLE: dict[str, list[Row]] = {
     "Isolation": [
         both(
             "an FMU in a process of its own: the same bits",
-            "ours, probe",
-            [f"{ISOLATED}::test_an_exported_plant", f"{ISOLATED}::test_numbers_of_all_types_and_events"],
+            "ours, probe, pythonfmu",
+            [
+                f"{ISOLATED}::test_an_exported_plant",
+                f"{ISOLATED}::test_numbers_of_all_types_and_events",
+                "test_conformance.py::test_a_plant_in_python_in_a_process_of_its_own",
+            ],
         ),
         both(
             "a crash ends the run with name, time and signal; what was computed is kept",

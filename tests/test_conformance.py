@@ -23,6 +23,7 @@ from tests.conformance import FMUS, NONE, PASS, TABLE, Row, cited, markdown, row
 from tests.cosim.probe import probe
 from tests.cosim.test_isolation import children
 from tests.fmus.host import building
+from tests.others import swing
 
 ROOT = Path(__file__).parents[1]
 
@@ -181,3 +182,15 @@ def test_isolated_instances_of_fmi_3_that_a_process_can_have_once_only(tmp_path:
     members = {n: FMU(path, isolated=True, start={"r_in": float(i)}) for i, n in enumerate("abc")}
     result = simulate(System(members), step=0.0625, stop=0.0625)
     assert [result[f"{n}.r_out"][0] for n in "abc"] == [0.0, 2.0, 4.0]
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_plant_in_python_in_a_process_of_its_own(tmp_path: Path, version: str) -> None:
+    """Two Pythons then: the master's, and the one that the tool's library loads there."""
+    path = swing(tmp_path, version)
+    runs = [
+        simulate(System({"p": FMU(path, isolated=isolated)}), step=0.01, stop=2.0)
+        for isolated in (True, False)
+    ]
+    assert np.array_equal(runs[0]["p.x"], runs[1]["p.x"])
+    assert np.ptp(runs[0]["p.x"]) > 1.0
