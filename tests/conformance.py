@@ -186,6 +186,7 @@ TABLE: dict[str, list[Row]] = {
                 "fmus/test_every_class.py::test_every_class_can_be_made",
                 "fmus/test_every_class.py::test_a_class_leaves",
             ],
+            "versions in turn; each class in both under the marker `long`",
         ),
         both(
             "controllers and plants close the loop in FMPy",

@@ -74,10 +74,10 @@ def classes() -> dict[str, type[Participant]]:
 
 @lru_cache(maxsize=1)
 def model() -> Model:
-    """A tower with damper: four states, of the top and of the damper; three measured accelerations."""
+    """A tower with damper: four states, and two accelerations, of the top and of the damper."""
     coupled, n = with_damper(small_tower(), Damper()), small_tower().dof
     return dominant_modes(
-        coupled.M, coupled.C, coupled.K, np.eye(n + 1)[:, n:], np.eye(n + 1)[:, :n], [n - 1, n], [2, n - 1, n]
+        coupled.M, coupled.C, coupled.K, np.eye(n + 1)[:, n:], np.eye(n + 1)[:, :n], [n - 1, n], [n - 1, n]
     )
 
 
@@ -91,7 +91,7 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     SlidingMode: [lambda: SlidingMode.design(model(), np.eye(4))],
     ContinuousSlidingMode: [lambda: ContinuousSlidingMode.design(model(), np.eye(4), 1.2)],
     StateFeedback: [lambda: StateFeedback.lqg(model(), np.eye(4), np.array([[1e-9]]), every=2)],
-    Observer: [lambda: Observer.design(model(), np.eye(5), 1e-6 * np.eye(3), H)],
+    Observer: [lambda: Observer.design(model(), np.eye(5), 1e-6 * np.eye(2), H)],
     StateSurface: [lambda: equivalent_force(model(), np.eye(4))[0]],
     EquivalentForce: [lambda: equivalent_force(model(), np.eye(4))[1]],
     # chapter 3

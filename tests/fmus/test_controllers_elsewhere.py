@@ -64,22 +64,22 @@ class Loop:
 
 
 def tower(law: Callable[[], Participant], *, filtered: bool) -> Loop:
-    """Chapter 2: wind, tower with damper, observer of three accelerations, law, filter."""
+    """Chapter 2: wind, tower with damper, observer of two accelerations, law, filter."""
     force = "filter.y[1]" if filtered else "law.u[1]"
 
     def members() -> dict[str, Participant]:
         found: dict[str, Participant] = {
-            "wind": WhiteNoise(sample_period=0.005, seed=4, sigma=[2e5] * 5),
-            "tower": DampedTower.of(small_tower(), [3, 5]),
-            "observer": Observer.design(model(), np.eye(5), 1e-14 * np.eye(3), 0.005),
+            "wind": WhiteNoise(sample_period=0.005, seed=4, sigma=[2e5, 4e5]),
+            "tower": DampedTower.of(small_tower(), [5]),
+            "observer": Observer.design(model(), np.eye(5), 1e-14 * np.eye(2), 0.005),
             "law": law(),
         }
         return found | ({"filter": LowPass(0.1, n=1, unit="N")} if filtered else {})
 
     connections = [
-        ("wind.y", "tower.w"),
-        ("tower.a", "observer.y[1:2]"),
-        ("tower.a_m", "observer.y[3]"),
+        ("wind.y", "tower.w[4:5]"),
+        ("tower.a[1]", "observer.y[1]"),
+        ("tower.a_m", "observer.y[2]"),
         ("observer.x_hat", "law.x_hat"),
         (force, "tower.u"),
     ]
@@ -93,7 +93,7 @@ def network() -> Loop:
     """Chapter 3: a network behind its kinematic observer moves two floors of a building that is shaken."""
     return Loop(
         lambda: {
-            "noise": WhiteNoise(sample_period=0.002, seed=4, sigma=20.0, unit="m/s^2"),
+            "noise": WhiteNoise(sample_period=0.002, seed=4, sigma=20.0, n=2, unit="m/s^2"),
             "building": building(),
             "observer": KinematicObserver(T=[[1.0, 0.01], [0.02, 0.99]]),
             "law": SCWNN.of_size(2, 30, k1=5.0, k2=1.0, g_min=2.0, s_max=2.0, u_max=100.0, d_max=0.001),
