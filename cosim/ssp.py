@@ -47,6 +47,7 @@ from .ssp_format import (
 from .ssp_parameters import Parameters, Value
 from .ssp_structure import Element, Link, Structure
 from .system import Member, System, inputs_of, outputs_of
+from .text_ports import text_port
 
 
 @dataclass(frozen=True)
@@ -248,6 +249,9 @@ class _Reader:
                 f"{self.where}: {text} is one step late inside of a system, which is not supported"
             )
         try:
+            if text_port(system, a, "output") or text_port(system, b, "input"):
+                system.connect(a, b)
+                return
             source, sink = system.port(a, "output"), system.port(b, "input")
             transformation = self._transformation(link, source.unit, sink.unit)
             late = None if initial is None else np.array(initial)

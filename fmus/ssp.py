@@ -44,6 +44,7 @@ from cosim.ssp_format import (
     tag,
 )
 from cosim.system import Connection, Member, Port, System
+from cosim.text_ports import TextPort
 
 from .export import write_archive
 from .link import ExportError
@@ -80,8 +81,6 @@ def export_ssp(
         raise SSPError(f"no SSP version '{version}'; choose from {', '.join(VERSIONS)}")
     if not system.participants:
         raise SSPError("a system without participants has nothing to export")
-    for texts in system.text_connections:
-        raise SSPError(f"{texts.source} -> {texts.target} is text, which is not written to an SSP yet")
     fmi_version = fmi_version or ("3.0" if version == "2.0" else "2.0")
     wanted = None if platforms is None else list(platforms)
     parts = fmu_parts(system, fmi_version, wanted)
@@ -100,9 +99,19 @@ def export_ssp(
     return target
 
 
+def _connections(system: System) -> list[Connection]:
+    """Return the connections of numbers, and those of strings and binary data like them."""
+
+    def port(end: TextPort) -> Port:
+        return Port(end.participant, end.name, (), None)
+
+    texts = [Connection(port(c.source), port(c.target)) for c in system.text_connections]
+    return [*system.connections, *texts]
+
+
 def _needs_2(system: System, parts: dict[str, Part]) -> str:
     """Return what SSP 1.0 has no words for, as the end of a sentence; nothing if it has."""
-    for c in system.connections:
+    for c in _connections(system):
         for end in (c.source, c.target):
             port = parts[end.participant].ports[end.name]
             if len(port.variables) != port.size:
@@ -124,7 +133,7 @@ class _Writer:
     """Writes SystemStructure.ssd."""
 
     def __init__(self, system: System, parts: dict[str, Part], version: str) -> None:
-        self.system = system
+        self.connections = _connections(system)
         self.parts = parts
         self.version = version
         self.definitions = Units()
@@ -144,7 +153,7 @@ class _Writer:
         elements = _add(system, SSD, "Elements")
         for part in self.parts.values():
             self._component(elements, part)
-        pairs = [pair for c in self.system.connections for pair in self._pairs(c)]
+        pairs = [pair for c in self.connections for pair in self._pairs(c)]
         connections = _add(system, SSD, "Connections") if pairs else None
         for c, source, target, late in pairs:
             self._connection(connections, c, source, target, late)
@@ -179,10 +188,7 @@ class _Writer:
     def _connectors(self, part: Part) -> dict[str, tuple[FMUPort, str]]:
         """Return all outputs, and the inputs and local variables that are connected."""
         used = {
-            end.name
-            for c in self.system.connections
-            for end in (c.source, c.target)
-            if end.participant == part.name
+            end.name for c in self.connections for end in (c.source, c.target) if end.participant == part.name
         }
         found: dict[str, tuple[FMUPort, str]] = {}
         for name, port in part.ports.items():
