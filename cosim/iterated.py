@@ -49,7 +49,7 @@ class IteratedCoupling:
         ticking = [n for n in self.members if getattr(program.system.participants[n], "clocks", None)]
         if ticking:
             raise WiringError(
-                f"{', '.join(ticking)} has clocks, which would tick at every repetition of a step; "
+                f"{', '.join(ticking)} cannot be iterated: clocks would tick at every repetition of a step; "
                 'use coupling="sampled"'
             )
         self._sources = list(dict.fromkeys(c.source for c in connections))

@@ -74,6 +74,7 @@ def metronome(
         "mightReturnEarlyFromDoStep": early_return,
         "needsExecutionTool": bool(tool),
         "canHandleVariableCommunicationStepSize": True,
+        "canGetAndSetFMUState": True,
     }
     says = " ".join(f'{name}="true"' for name, value in can.items() if value)
     token, made = ("toolless", f'generationTool="{tool}"') if tool else ("metronome", "")

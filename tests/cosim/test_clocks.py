@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cosim import FMU, Block, Input, Output, State, System, simulate
+from cosim import FMU, Block, Input, Output, Simulation, State, System, simulate
 from cosim.errors import FMUError, SimulationError, TimeError, WiringError
 from cosim.inspection import inspection
 
@@ -133,6 +133,32 @@ def test_clocks_that_are_refused(path, tmp_path):
         FMU(path, start={"tick": "fast"})
     with pytest.raises(FMUError, match=r"clock own has no interval, .* give one: start=\{'own': 0\.01\}"):
         simulate(System({"m": FMU(path, start={"own_period": -1.0})}), step=H, stop=5.0)
+
+
+def test_a_snapshot_holds_clocks_events_and_texts(path):
+    """What comes after it comes again: ticks, entries into event mode, texts that are not set again."""
+    start = {"word": "here", "kick_by": 2.0, "own_period": 0.5}
+    system = System({n: FMU(path, start=start) for n in ("a", "b")})
+    for source, target in (("wrap", "kick"), ("echo", "word")):
+        system.connect(f"a.{source}", f"b.{target}")
+    record = ["b.echo", "b.kicked", "b.owns", "b.samples", "b.entries", "a.wrap", "a.beats"]
+    with Simulation(system, step=H, record=record) as simulation:
+        simulation.run(2.75)
+        there = simulation.snapshot()
+        one = simulation.run(8.0)
+        simulation.restore(there)
+        other = simulation.run(8.0)
+    whole = simulate(system, step=H, stop=8.0, record=record)
+    for name in one.signals:
+        assert list(one[name]) == list(other[name]) == list(whole[name][11:]), name
+    assert one.texts == other.texts == {"b.echo": ["here!!"] * 22}
+    assert one["b.kicked"][-1] == 14.0
+
+
+def test_clocks_do_not_tick_in_repetitions(path):
+    system = System({"a": FMU(path), "b": FMU(path)}, [("a.x", "b.u"), ("b.x", "a.u")])
+    with pytest.raises(WiringError, match="a, b cannot be iterated: clocks would tick at every repetition"):
+        simulate(system, step=H, stop=1.0, coupling="iterated")
 
 
 def test_inspection_shows_when_clocks_tick(path):

@@ -92,6 +92,20 @@ EXPORT fmi3Status fmi3ExitInitializationMode(P) {
 }
 EXPORT fmi3Status fmi3Terminate(P) { return fmi3OK; }
 
+EXPORT fmi3Status fmi3GetFMUState(P, void **state) {
+    *state = memcpy(malloc(sizeof *p), p, sizeof *p);
+    return fmi3OK;
+}
+EXPORT fmi3Status fmi3SetFMUState(P, void *state) {
+    memcpy(p, state, sizeof *p);
+    return fmi3OK;
+}
+EXPORT fmi3Status fmi3FreeFMUState(P, void **state) {
+    free(*state);
+    *state = NULL;
+    return fmi3OK;
+}
+
 /* --- events */
 
 static double next_beat(const struct metronome *p) {
