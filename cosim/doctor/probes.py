@@ -297,8 +297,9 @@ def _changed(before: Values, after: Values) -> list[str]:
 def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict:
     """Compare what was seen with what the model structure declares."""
     declared = fmu.feedthrough()
-    listed = {u.variable.name: u.dependencies is not None for u in fmu.description.outputs}
-    open_ends = [n for n, p in subject.outputs.items() if not all(listed.get(v.name) for v in p.variables)]
+    numeric = [u for u in fmu.description.outputs if u.variable.type in subject.fmi.NUMBERS]
+    listed = {fmu.key(u.variable) for u in numeric if u.dependencies is not None}  # aliases share it
+    open_ends = [n for n, p in subject.outputs.items() if not {fmu.key(v) for v in p.variables} <= listed]
     hidden = [f"{o} on {i}" for o, inputs in seen.items() for i in sorted(inputs - declared[o])]
     if hidden:
         return "error", f"not declared: {named(hidden)}"

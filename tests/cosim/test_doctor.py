@@ -191,6 +191,12 @@ def test_units_that_are_missing_or_not_known(bad, tmp_path):
     assert words == "1 of 3 inputs and outputs have none: u; not known, so not converted: furlog"
 
 
+def test_dependencies_that_are_not_listed_are_named(tmp_path):
+    """i_out has none; x_alias is another name of x, which has; v_out is an array."""
+    level, words = probed(probe(tmp_path / "probe.fmu", "3.0"), "feedthrough", CS)
+    assert (level, words.partition("; ")[2]) == ("note", "no dependencies listed, which means all: i_out")
+
+
 def test_an_fmu_that_can_be_there_once_only_is_left_in_peace(tmp_path):
     path = probe(tmp_path / "once.fmu", "3.0", once=True)
     for name in ("leak", "several instances", "step size"):
