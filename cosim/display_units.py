@@ -83,9 +83,13 @@ def _number(where: str, port: FMUPort, units: Iterable[Any], text: str) -> float
     declared = [d for u in units if u.name == unit for d in u.displayUnits]
     for display in declared:
         if display.name == given:
-            if display.inverse and shown == 0.0:
-                raise FMUError(f"{what}: {given} is the inverse of {unit}, and 0 has none")
-            return float(display.value(shown, port.relative))
+            try:
+                return float(display.value(shown, port.relative))
+            except ZeroDivisionError:
+                inverse = "the inverse of " if display.inverse else ""
+                raise FMUError(
+                    f"{what}: {given} is {inverse}{unit} times {display.factor:g}, and no value is shown so"
+                ) from None
     try:
         scale, offset = conversion(given, unit)
     except WiringError as error:
