@@ -39,7 +39,7 @@ from .ssp_format import (
     Units,
     element_name,
     flag,
-    numbers,
+    number,
     own_annotation,
     parse_xml,
     tag,
@@ -200,12 +200,13 @@ class _Reader:
             options["interface"] = interface
         if "solver" in own:
             options["solver"] = own["solver"]
-        if "eventMode" in own:
-            options["event_mode"] = flag(own["eventMode"])
+        options |= {
+            n: flag(own[a]) for n, a in (("event_mode", "eventMode"), ("isolated", "isolated")) if a in own
+        }
         options |= {n: _whole(own[n], where) for n in ("substeps", "every") if n in own}
         for name, attribute in (("tolerance", "tolerance"), ("sample_period", "samplePeriod")):
             if attribute in own:
-                options[name] = numbers(own[attribute], where)[0]
+                options[name] = number(own[attribute], where)
         return options
 
     def _start_values(self, element: Element, description: Any, links: list[Link]) -> dict[str, Any]:
@@ -244,17 +245,19 @@ class _Reader:
         a, b = (f"{element_name(node.path)}.{node.text}" for node in (origin, target))
         text = " -> ".join(map(str, [origin, *(edge.target for edge in link.edges)]))
         initial = link.edges[0].initial
+        late = None if initial is None else np.array(initial)
         if len(link.edges) > 1 and any(edge.initial is not None for edge in link.edges):
             raise SSPError(
                 f"{self.where}: {text} is one step late inside of a system, which is not supported"
             )
         try:
-            if text_port(system, a, "output") or text_port(system, b, "input"):
-                system.connect(a, b)
-                return
-            source, sink = system.port(a, "output"), system.port(b, "input")
-            transformation = self._transformation(link, source.unit, sink.unit)
-            late = None if initial is None else np.array(initial)
+            transformation = None
+            if text_port(system, a, "output") is None:
+                source, sink = system.port(a, "output"), system.port(b, "input")
+                relative = system.is_relative(source) or system.is_relative(sink)
+                transformation = self._transformation(link, source.unit, sink.unit, relative)
+            elif any((edge.factor, edge.offset) != (1.0, 0.0) for edge in link.edges):
+                transformation = (0.0, 0.0)  # which is refused for a text
             system.connect(a, b, initial=late, transformation=transformation)
         except WiringError as error:
             ends = (element_name(node.path) for node in (origin, target))
@@ -264,8 +267,13 @@ class _Reader:
                 text += f" ({name} is replaced by a {type(member).__name__}, ports: {ports})"
             raise WiringError(f"{self.where}: {text}: {error}") from error
 
-    def _transformation(self, link: Link, first: str | None, last: str | None) -> tuple[float, float]:
-        """Return (factor, offset) from a port's unit over all connectors to another port's unit."""
+    def _transformation(
+        self, link: Link, first: str | None, last: str | None, relative: bool = False
+    ) -> tuple[float, float]:
+        """Return (factor, offset) from a port's unit over all connectors to another port's unit.
+
+        Relative quantities are differences: their units are converted without offset.
+        """
         scale, offset, unit = 1.0, 0.0, first
 
         def apply(factor: float, shift: float) -> None:
@@ -275,7 +283,8 @@ class _Reader:
 
         def to(other: str | None) -> None:
             nonlocal unit
-            apply(*self.units.convert(unit, other))
+            factor, shift = self.units.convert(unit, other)
+            apply(factor, 0.0 if relative else shift)
             unit = other or unit
 
         to(self.structure.units.get(link.origin.whole))
@@ -298,7 +307,7 @@ class _Reader:
         own = own_annotation(found, SSD, "experiment")
         where = f"{self.where}: default experiment"
         texts = {"start": found.get("startTime"), "stop": found.get("stopTime"), "step": own.get("step")}
-        times = {name: numbers(text, where)[0] for name, text in texts.items() if text}
+        times = {name: number(text, where) for name, text in texts.items() if text}
         return Experiment(**times, coupling=own.get("coupling"), solver=own.get("solver"))
 
 

@@ -4,13 +4,15 @@ SSP does not say when a component acts, nor with which step a system is run. Tha
 annotations of our own, which other tools skip (SSP 1.0, 4.2: unknown types are ignored):
 
     on a component     <participant kind="block" every="2" samplePeriod="0.01"/>
-                       <participant solver="cvode" tolerance="1e-8" substeps="4" eventMode="true"/>
+                       <participant solver="cvode" tolerance="1e-8" substeps="4" eventMode="true"
+                                    isolated="true"/>
     on a connection    <delay initial="0.5 1.0"/>             one communication step late
     on the experiment  <experiment step="0.01" coupling="sampled" solver="ode3"/>
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -89,6 +91,19 @@ def numbers(text: str, where: str) -> list[float]:
         raise SSPError(f"{where}: '{text}' is no list of numbers") from None
 
 
+def number(text: str, where: str) -> float:
+    """Return one number."""
+    found = numbers(text, where)
+    if len(found) != 1:
+        raise SSPError(f"{where}: '{text}' is not one number")
+    return found[0]
+
+
+def factor_and_offset(element: etree._Element, where: str) -> tuple[float, float]:
+    """Return the attributes of a LinearTransformation or a BaseUnit."""
+    return number(element.get("factor", "1"), where), number(element.get("offset", "0"), where)
+
+
 _INFINITE = {"INF": "inf", "-INF": "-inf"}
 
 
@@ -111,10 +126,10 @@ class Units:
             base = unit.find(f"{SSC}:BaseUnit", NAMESPACES)
             if base is not None:
                 place = f"{where}, unit '{unit.get('name')}'"
-                exponents = numbers(" ".join(base.get(n, "0") for n in BASE_UNITS), place)
-                factor, offset = numbers(f"{base.get('factor', '1')} {base.get('offset', '0')}", place)
-                if factor == 0.0:
-                    raise SSPError(f"{place}: its factor is zero")
+                exponents = [number(base.get(n, "0"), place) for n in BASE_UNITS]
+                factor, offset = factor_and_offset(base, place)
+                if not all(map(math.isfinite, (*exponents, 1.0 / factor if factor else math.inf, offset))):
+                    raise SSPError(f"{place}: its exponents, factor {factor} and offset {offset} are no unit")
                 found.definitions[unit.get("name", "")] = (tuple(map(int, exponents)), factor, offset)
         return found
 

@@ -15,7 +15,20 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from .ssp_format import NAMESPACES, SSC, SSD, SSM, SSV, SSPError, Units, flag, numbers, parse_xml, tag
+from .ssp_format import (
+    NAMESPACES,
+    SSC,
+    SSD,
+    SSM,
+    SSV,
+    SSPError,
+    Units,
+    factor_and_offset,
+    flag,
+    numbers,
+    parse_xml,
+    tag,
+)
 from .ssp_structure import Element, Node
 
 _REALS = {"Real", "Float64", "Float32"}
@@ -146,7 +159,10 @@ def _value(parameter: etree._Element, units: Units, where: str) -> Value:
             values = [bytes.fromhex(v) for v in values]
         except ValueError:
             raise SSPError(f"{where}: '{text}' is no hexadecimal number") from None
-    shape = [int(d.get("size", "1")) for d in parameter.iterfind(f"{SSC}:Dimension", NAMESPACES)]
+    sizes = [d.get("size", "") for d in parameter.iterfind(f"{SSC}:Dimension", NAMESPACES)]
+    if not all(size.isascii() and size.isdigit() and len(size) < 10 for size in sizes):
+        raise SSPError(f"{where}: dimensions {sizes} are no whole numbers")
+    shape = [int(size) for size in sizes]
     if shape or len(values) != 1:
         try:
             plain = np.array(values, dtype=object).reshape(shape or [-1]).tolist()
@@ -166,7 +182,7 @@ def _mapped(value: Value, entry: etree._Element, where: str) -> Value:
     keep = flag(entry.get("suppressUnitConversion"))
     if linear is None:
         return replace(value, keep_unit=keep)
-    factor, offset = numbers(f"{linear.get('factor', '1')} {linear.get('offset', '0')}", where)
+    factor, offset = factor_and_offset(linear, where)
     if value.kind not in _REALS:
         raise SSPError(f"{where}: a LinearTransformation of {value.kind} values is not defined")
     return replace(value, factor=factor, offset=offset, keep_unit=keep)

@@ -16,7 +16,18 @@ from typing import TypeAlias
 from lxml import etree
 
 from .errors import did_you_mean
-from .ssp_format import NAMESPACES, SSB, SSC, SSD, SSPError, flag, numbers, own_annotation, tag
+from .ssp_format import (
+    NAMESPACES,
+    SSB,
+    SSC,
+    SSD,
+    SSPError,
+    factor_and_offset,
+    flag,
+    numbers,
+    own_annotation,
+    tag,
+)
 
 Path: TypeAlias = tuple[str, ...]
 #: kinds of connectors that give a value to the outside of their element
@@ -183,7 +194,7 @@ class Structure:
         factor, offset = 1.0, 0.0
         linear = c.find(f"{SSC}:LinearTransformation", NAMESPACES)
         if linear is not None:
-            factor, offset = numbers(f"{linear.get('factor', '1')} {linear.get('offset', '0')}", text)
+            factor, offset = factor_and_offset(linear, text)
         delay = own_annotation(c, SSD, "delay").get("initial")
         return Edge(
             source,

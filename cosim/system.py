@@ -160,7 +160,7 @@ class System:
                 raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
         try:
             scale, offset = transformation or conversion(out.unit, into.unit)
-            if transformation is None and (self._is_relative(out) or self._is_relative(into)):
+            if transformation is None and (self.is_relative(out) or self.is_relative(into)):
                 offset = 0.0
         except WiringError as error:
             raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
@@ -188,7 +188,7 @@ class System:
             self.text_connections.pop()
             raise
 
-    def _is_relative(self, port: Port) -> bool:
+    def is_relative(self, port: Port) -> bool:
         """Tell whether a port is a difference, such as one of temperatures, whose unit has no offset."""
         member = self.participants[port.participant]
         if not isinstance(member, FMU):

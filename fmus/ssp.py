@@ -62,6 +62,8 @@ def export_ssp(
     step: float | None = None,
     stop: float | None = None,
     start: float = 0.0,
+    coupling: str | None = None,
+    solver: str | None = None,
     version: str | None = None,
     fmi_version: str | None = None,
     platforms: Iterable[str] | None = None,
@@ -70,6 +72,8 @@ def export_ssp(
 
     step, stop, start
         default experiment, in s; a package without one is run with `--step` and `--stop`
+    coupling, solver
+        what `simulate` takes, if it is another one than sampled coupling; for our own reader
     version
         "1.0" or "2.0"; None takes 1.0 where it can say what the system is
     fmi_version
@@ -89,7 +93,9 @@ def export_ssp(
         raise SSPError(f"SSP 1.0 cannot say that {needs}; write version 2.0, or FMUs of FMI 2.0")
     writer = _Writer(system, parts, version or ("2.0" if needs else "1.0"))
     target = Path(path)
-    text = writer.document(target.stem, start, stop, step)
+    asked = {"step": None if step is None else repr(float(step)), "coupling": coupling, "solver": solver}
+    facts = {name: value for name, value in asked.items() if value is not None}
+    text = writer.document(target.stem, start, stop, facts)
     files = {f"resources/{part.source}": part.file for part in parts.values()}
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -142,7 +148,7 @@ class _Writer:
         self.units: set[str] = set()
         self.enumerations: dict[str, list[tuple[str, int]]] = {}
 
-    def document(self, name: str, start: float, stop: float | None, step: float | None) -> bytes:
+    def document(self, name: str, start: float, stop: float | None, facts: dict[str, str]) -> bytes:
         """Return the text."""
         root = etree.Element(
             tag(SSD, "SystemStructureDescription"),
@@ -159,7 +165,7 @@ class _Writer:
             self._connection(connections, c, source, target, late)
         self._add_enumerations(root, SSD)
         self._add_units(root, SSD, self.units)
-        self._experiment(root, start, stop, step)
+        self._experiment(root, start, stop, facts)
         return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
     # ---------------------------------------------------------------------- components
@@ -301,19 +307,22 @@ class _Writer:
             unit = _add(section, SSC, "Unit", name=name)
             etree.SubElement(unit, tag(SSC, "BaseUnit"), self.definitions.attributes(name))
 
-    def _experiment(self, root: etree._Element, start: float, stop: float | None, step: float | None) -> None:
-        if stop is None and step is None:
+    def _experiment(
+        self, root: etree._Element, start: float, stop: float | None, facts: dict[str, str]
+    ) -> None:
+        if stop is None and not facts:
             return
         experiment = _add(root, SSD, "DefaultExperiment", startTime=repr(float(start)))
         if stop is not None:
             experiment.set("stopTime", repr(float(stop)))
-        if step is not None:
+        if facts:
             notes = _add(experiment, SSD, "Annotations")
-            _annotate(notes, "experiment", {"step": repr(float(step))})
+            _annotate(notes, "experiment", facts)
+        if "step" in facts:
             note = _add(notes, SSC, "Annotation", type=_OSP[0])
             algorithm = etree.SubElement(note, f"{{{_OSP[1]}}}Algorithm")
             fixed = etree.SubElement(algorithm, f"{{{_OSP[1]}}}FixedStepAlgorithm")
-            fixed.set("baseStepSize", repr(float(step)))
+            fixed.set("baseStepSize", facts["step"])
 
 
 def _add(parent: etree._Element, prefix: str, element: str, /, **attributes: str) -> etree._Element:
@@ -339,6 +348,7 @@ def _facts(member: Member) -> dict[str, str]:
         facts |= {} if member.substeps == 1 else {"substeps": str(member.substeps)}
         facts |= {} if member.tolerance == DEFAULT_TOLERANCE else {"tolerance": repr(member.tolerance)}
         facts |= {"eventMode": "true"} if member.event_mode else {}
+        facts |= {"isolated": "true"} if member.isolated else {}
     return facts
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 import zipfile
 
 import numpy as np
@@ -11,7 +13,7 @@ from hypothesis import strategies as st
 
 from cosim import FMU, Block, Input, Output, System, simulate
 from cosim.errors import CosimError, WiringError
-from cosim.ssp import read_package, read_ssp
+from cosim.ssp import Experiment, read_package, read_ssp
 from cosim.ssp_format import NAMESPACES, SSPError
 from fmus.export import export
 from fmus.ssp import export_ssp
@@ -106,6 +108,20 @@ def test_the_parameters_of_a_python_participant_are_in_its_set(tmp_path):
         for name, data in files.items():
             archive.writestr(name, data)
     assert read_ssp(changed).participants["damper"].start["g"] == 44.5
+
+
+def test_how_fmus_and_the_system_are_run_is_kept(tmp_path):
+    fmu = export(Frame(), tmp_path / "frame.fmu")
+    given = FMU(fmu, interface="ModelExchange", solver="ode2", substeps=3)
+    stiff = FMU(fmu, interface="ModelExchange", solver="cvode", tolerance=1e-9)
+    system = System({"a": given, "b": stiff, "c": FMU(fmu, interface="CoSimulation", isolated=True)})
+    path = export_ssp(system, tmp_path / "me.ssp", step=H, stop=STOP, coupling="continuous", solver="ode4")
+    validated(path)
+    package = read_package(path)
+    assert package.experiment == Experiment(0.0, STOP, H, "continuous", "ode4")
+    for name in ("interface", "solver", "substeps", "tolerance", "isolated", "as_block", "event_mode"):
+        for key, member in system.participants.items():
+            assert getattr(package.system.participants[key], name) == getattr(member, name), (key, name)
 
 
 def test_one_file_for_two_of_the_same_fmu(tmp_path):
@@ -240,3 +256,28 @@ def test_any_wiring_comes_back(files, tmp_path, data):
         assert (other.as_block, other.every, other.sample_period) == (
             member.as_block, member.every, member.sample_period
         )  # fmt: skip
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_other_text_is_read_or_refused(tmp_path, data):
+    """A changed SSD gives a system or an error of ours, never another one."""
+    path = tmp_path / "good.ssp"
+    if not path.exists():
+        export_ssp(loop(), path)
+    with zipfile.ZipFile(path) as archive:
+        files = {n: archive.read(n) for n in archive.namelist()}
+    text = files["SystemStructure.ssd"].decode()
+    words = sorted(set(re.findall(r'[\w:.]+|"[^"]*"', text)))
+    for _ in range(data.draw(st.integers(1, 4))):
+        word = data.draw(st.sampled_from(words))
+        other = data.draw(
+            st.sampled_from(words) | st.sampled_from(['""', '"-1"', '"nan"', '"1e400"', '"[1]"', ""])
+        )
+        text = text.replace(word, other, data.draw(st.sampled_from([1, -1])))
+    changed = tmp_path / "changed.ssp"
+    with zipfile.ZipFile(changed, "w") as archive:
+        for name, content in (files | {"SystemStructure.ssd": text.encode()}).items():
+            archive.writestr(name, content)
+    with contextlib.suppress(CosimError):
+        assert len(read_ssp(changed).participants) <= 3
