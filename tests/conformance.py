@@ -23,6 +23,7 @@ FMUS = {
     ),
     "pythonfmu": ("tests/others.py", "made by pythonfmu 0.7 (FMI 2.0) and pythonfmu3 0.3 (FMI 3.0)"),
     "crash": ("tests/cosim/c/crash.c", "C; ends its process in any call"),
+    "bad": ("tests/cosim/c/bad.c", "C; good or with one of the faults that the doctor looks for"),
     "broken": ("tests/cosim/test_archive.py", "damaged and hostile archives and descriptions"),
 }
 
@@ -51,14 +52,23 @@ F3, ME = "cosim/test_fmu3.py", "cosim/test_model_exchange.py"
 EVENTS, STATES = "cosim/test_co_simulation_events.py", "cosim/test_simulation.py"
 
 ISOLATED, EXAMPLES = "cosim/test_isolation.py", "scenarios/test_examples.py"
+UNITS, DOCTOR = "cosim/test_start_units.py", "cosim/test_doctor.py"
 
 TABLE: dict[str, list[Row]] = {
     "In": [
         both("Co-Simulation", "probe, ours", [f"{F3}::test_hand_written_fmus_are_valid_and_run_in_fmpy"]),
         both(
-            "plants made by others, tool coupling",
+            "plants made by others",
             "pythonfmu",
             [f"{EXAMPLES}::test_a_controller_on_somebody_elses_plant"],
+        ),
+        both(
+            "tool coupling; a tool that is missing is named",
+            "pythonfmu, metronome",
+            [
+                f"{EXAMPLES}::test_a_controller_on_somebody_elses_plant",
+                "cosim/test_loading.py::test_an_fmu_that_needs_its_tool_says_so",
+            ],
         ),
         both(
             "Model Exchange, ode1 to ode4 in the compiled loop",
@@ -149,6 +159,11 @@ TABLE: dict[str, list[Row]] = {
             "units, converted on connections",
             "probe",
             [f"{F3}::test_units_strings_and_dependencies", "cosim/test_wiring.py::test_units_are_converted"],
+        ),
+        both(
+            "display units; start values with units",
+            "probe",
+            [f"{UNITS}::test_start_values_with_units", f"{UNITS}::test_inspection_shows_display_units"],
         ),
         only3("aliases", "probe", [f"{F3}::test_aliases_are_names_of_one_variable"]),
         both(
@@ -313,6 +328,11 @@ TABLE: dict[str, list[Row]] = {
             "SSP 1.0; these tools have no arrays, libcosim no FMI 3.0",
         ),
         both(
+            "a whole system as one FMU",
+            "ours",
+            ["fmus/test_container.py::test_the_same_bits_as_the_system"],
+        ),
+        both(
             "`cosim run loop.ssp`, with Python blocks named on the command line",
             "ours",
             [
@@ -342,6 +362,23 @@ TABLE: dict[str, list[Row]] = {
             "ours",
             ["cosim/test_iterated.py::test_a_coupling_without_solution_ends_the_run_with_what_was_computed"],
         ),
+    ],
+    "Doctor": [
+        both(
+            "what is fine is said to be fine",
+            "ours",
+            [f"{DOCTOR}::test_an_fmu_of_ours_has_nothing_above_a_note"],
+        ),
+        both(
+            "faults are found by the probe that is for them, crashes among them",
+            "bad, probe, pythonfmu",
+            [
+                f"{DOCTOR}::test_a_fault_is_found",
+                f"{DOCTOR}::test_what_takes_the_process_with_it_is_found",
+                "test_conformance.py::test_the_doctor_on_fmus_that_are_not_ours",
+            ],
+        ),
+        both("report, `--json`, exit code by the worst finding", "bad", [f"{DOCTOR}::test_the_command_line"]),
     ],
     "Isolation": [
         both(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import signal
@@ -15,6 +16,7 @@ import pytest
 from fmpy.fmi3 import FMU3Slave
 
 from cosim import FMU, Block, Input, System, simulate
+from cosim.app import main
 from cosim.blocks import function_source
 from cosim.errors import SimulationError
 from fmus.export import export
@@ -194,3 +196,24 @@ def test_a_plant_in_python_in_a_process_of_its_own(tmp_path: Path, version: str)
     ]
     assert np.array_equal(runs[0]["p.x"], runs[1]["p.x"])
     assert np.ptp(runs[0]["p.x"]) > 1.0
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_doctor_on_fmus_that_are_not_ours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], version: str
+) -> None:
+    """probe.h keeps its time over a reset and reads any value reference; pythonfmu steps backwards."""
+
+    def findings(path: Path, *probes: str) -> dict[str, str]:
+        with pytest.raises(SystemExit):
+            main(["doctor", str(path), "--json", *(word for name in probes for word in ("--probe", name))])
+        listed = json.loads(capsys.readouterr().out)["findings"]
+        return {f["probe"]: f["level"] for f in listed if f["probe"] in probes}
+
+    theirs = probe(tmp_path / "probe.fmu", version)
+    assert findings(theirs, "reset", "unknown value reference") == {
+        "reset": "error",
+        "unknown value reference": "crashed",
+    }
+    python = swing(tmp_path, version)
+    assert findings(python, "reset", "negative step") == {"reset": "ok", "negative step": "warning"}
