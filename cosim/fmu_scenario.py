@@ -34,6 +34,7 @@ def fmu_scenario(path: Path) -> Scenario:
         substeps: int = 1,
         tolerance: float | None = None,
         event_mode: bool | None = None,
+        isolated: bool = False,
         input: Path | None = None,
         start: tuple[str, ...] = (),
     ) -> System:
@@ -46,6 +47,7 @@ def fmu_scenario(path: Path) -> Scenario:
             substeps=substeps,
             tolerance=tolerance,
             event_mode=event_mode,
+            isolated=isolated,
         )
         system = System({name: fmu})
         if input is not None:
@@ -62,6 +64,7 @@ def fmu_scenario(path: Path) -> Scenario:
         substeps: int = 1,
         tolerance: float | None = None,
         event_mode: bool | None = None,
+        isolated: bool = False,
         input: Path | None = None,
         start: tuple[str, ...] = (),
         record: tuple[str, ...] = (),
@@ -87,6 +90,8 @@ def fmu_scenario(path: Path) -> Scenario:
             relative tolerance of cvode [1e-6]
         event_mode
             of Co-Simulation: handle events at their instants [where the FMU has clocks]
+        isolated
+            run the FMU in a process of its own: a crash of it is an error here
         input
             CSV file: time and inputs by name; linear for continuous inputs, held for others
         start
@@ -95,9 +100,16 @@ def fmu_scenario(path: Path) -> Scenario:
         record
             variable to record; may be repeated [all outputs]
         """
-        options = {"interface": interface, "solver": solver, "substeps": substeps, "tolerance": tolerance}
-        options["event_mode"] = event_mode
-        system = build(**options, input=input, start=start)  # type: ignore[arg-type]
+        system = build(
+            interface=interface,
+            solver=solver,
+            substeps=substeps,
+            tolerance=tolerance,
+            event_mode=event_mode,
+            isolated=isolated,
+            input=input,
+            start=start,
+        )
         fmu = system.participants[name]
         assert isinstance(fmu, FMU)
         begin, end, h = _times(fmu, start_time, stop, step)

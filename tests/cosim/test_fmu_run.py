@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import zipfile
 from pathlib import Path
@@ -9,11 +10,13 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from cosim import FMU, Input, LinearContinuous, Parameter, Result, State, System, simulate
 from cosim.app import main
 from cosim.blocks import TableSource
-from cosim.errors import DeclarationError, FMUError, RecordError
+from cosim.errors import CosimError, DeclarationError, FMUError, RecordError
 from cosim.fmu_scenario import fmu_scenario
 from cosim.input_table import connect_inputs
 from fmus.description import DefaultExperiment
@@ -22,6 +25,7 @@ from fmus.export import export
 from .ball import ball
 from .probe import probe
 from .test_fmu import Chain
+from .test_isolation import crash
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +129,33 @@ def test_files_that_are_no_inputs(folder, tmp_path, text, words):
     assert type(caught.value).__module__ == "cosim.errors"
 
 
+FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=64)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.floats(0.0, 1e6), FLOATS, FLOATS), min_size=1, max_size=20))
+def test_numbers_come_out_of_a_file_as_they_went_in(folder, tmp_path, rows):
+    """repr and float are inverse to each other: the table of the block is what was written, bit for bit."""
+    rows = sorted(rows, key=lambda row: row[0])
+    lines = [f"{t!r}, {a!r}  {b!r}" for t, a, b in rows]
+    (tmp_path / "in.csv").write_text("\r\n".join(["time,u", *lines]))
+    system = System({"chain": FMU(folder / "chain.fmu")})
+    connect_inputs(system, "chain", tmp_path / "in.csv")
+    source = system.participants["input_1"]
+    assert list(source.instants) == [t for t, _, _ in rows]
+    assert source.rows.tolist() == [[a, b] for _, a, b in rows]
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(alphabet='timeu[12],"\n\r\t .-+e5nax\0é', max_size=60))
+def test_any_text_is_inputs_or_an_error_of_ours(folder, tmp_path, text):
+    (tmp_path / "in.csv").write_text(text, encoding="utf-8", newline="")
+    system = System({"chain": FMU(folder / "chain.fmu")})
+    with contextlib.suppress(CosimError):
+        connect_inputs(system, "chain", tmp_path / "in.csv")
+        assert len(system.participants) > 1
+
+
 def test_a_missing_or_binary_file_and_a_text_input(folder, tmp_path):
     system = System({"p": FMU(folder / "probe.fmu")})
     with pytest.raises(RecordError, match="cannot be read"):
@@ -139,18 +170,8 @@ def test_a_missing_or_binary_file_and_a_text_input(folder, tmp_path):
 
 def test_the_command_writes_what_it_finds(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    main(
-        [
-            "run",
-            str(folder / "chain.fmu"),
-            "--interface",
-            "ModelExchange",
-            "--solver",
-            "ode2",
-            "--start",
-            "k=5",
-        ]
-    )
+    options = ["--interface", "ModelExchange", "--solver", "ode2", "--start", "k=5"]
+    main(["run", str(folder / "chain.fmu"), *options])
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1].startswith("10 steps in ")
     assert "peak chain.a[2]" in lines[1]
@@ -213,6 +234,15 @@ def test_an_end_that_the_fmu_asks_for_is_told(folder, tmp_path, monkeypatch, cap
     assert "ball asked to end the simulation at t = 2.82" in out.out
     assert out.err == ""
     assert json.loads(Path("out/ball/metrics.json").read_text())["ended"].startswith("ball asked")
+
+
+def test_a_crash_of_an_isolated_fmu_keeps_what_was_computed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    crash(tmp_path, "DoStep null 0.5")
+    with pytest.raises(SystemExit):
+        main(["run", "crash.fmu", "--isolated", "--stop", "1", "--step", "0.125"])
+    assert "SIGSEGV" in capsys.readouterr().err
+    assert list(Result.load("out/crash/result.npz").time) == [0.0, 0.125, 0.25, 0.375, 0.5]
 
 
 @pytest.mark.parametrize(
