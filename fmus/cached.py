@@ -12,6 +12,7 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
+from cosim import c_compiler
 from cosim.compiler import cache_directory, kernel_key
 from cosim.fmu import FMU
 from cosim.participant import Participant
@@ -22,9 +23,9 @@ from .link import warm_up
 
 @lru_cache(maxsize=1)
 def _exporter() -> bytes:
-    """Return a hash of the exporter's source."""
+    """Return a hash of the exporter's source, and of how it compiles."""
     here = Path(__file__).parent
-    files = sorted([*here.glob("*.py"), *here.glob("c/*")])
+    files = [*sorted([*here.glob("*.py"), *here.glob("c/*")]), Path(c_compiler.__file__)]
     return hashlib.sha256(b"".join(f.read_bytes() for f in files)).digest()
 
 
