@@ -21,8 +21,8 @@
 
 enum {
     LONG_WATCH = 50000, /* ns */
-    SHORT_WATCH = 500,
-    TRY_AGAIN = 64, /* waits */
+    SHORT_WATCH = 300,
+    TRY_AGAIN = 256, /* waits */
     LONGEST_SLEEP = 50000000,
 };
 
@@ -88,9 +88,11 @@ static void sleep_until(_Atomic uint32_t *word, uint32_t number, struct waiting 
 
 bool channel_wait(_Atomic uint32_t *word, uint32_t number, struct waiting *self)
 {
-    const bool is_long = self->patient || ++self->often % TRY_AGAIN == 0;
-    self->patient = watch(word, number, is_long ? LONG_WATCH : SHORT_WATCH) && is_long;
-    if (!self->patient && atomic_load(word) != number)
+    const bool is_long = !self->hasty || ++self->often % TRY_AGAIN == 0;
+    const bool came = watch(word, number, is_long ? LONG_WATCH : SHORT_WATCH);
+    if (is_long)
+        self->hasty = !came;
+    if (!came)
         sleep_until(word, number, self);
     return atomic_load(word) == number;
 }

@@ -56,8 +56,8 @@ struct log_line {
 /* What one side knows about how to wait for the other. */
 struct waiting {
     _Atomic uint32_t sleeps;
-    uint32_t often; /* waits so far */
-    bool patient;   /* watching was worth it last time */
+    uint32_t often; /* waits in haste */
+    bool hasty;     /* watching long was in vain last time */
 };
 
 struct channel {

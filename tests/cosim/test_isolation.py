@@ -7,13 +7,16 @@ import subprocess
 import sys
 import textwrap
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import cosim
 from cosim import FMU, Block, Output, Simulation, System, simulate
+from cosim.c_compiler import LIBRARY_FLAGS, PLATFORMS, fmi_headers, host, zig_cc
 from cosim.errors import FMUError, SimulationError
 from cosim.fmi2 import Fmi2
 from cosim.fmi3 import Fmi3
@@ -32,6 +35,7 @@ INTERFACES = ["CoSimulation", "ModelExchange"]
 
 def crash(folder: Path, fault: str = "none", interface: str = "CoSimulation") -> FMU:
     """The FMU of c/crash.c."""
+    folder.mkdir(exist_ok=True)
     text = f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="crash" guid="{fault}">
 <{interface} modelIdentifier="crash"/><ModelVariables>
@@ -176,8 +180,8 @@ def test_the_fmu_is_in_the_other_process_only(tmp_path, version):
     with instance(
         {"2.0": Fmi2, "3.0": Fmi3}[version], FMU(probe(tmp_path / "probe.fmu", version), isolated=True)
     ):
-        (host,) = children(os.getpid())
-        assert "/probe.so" in Path(f"/proc/{host}/maps").read_text()
+        (child,) = children(os.getpid())
+        assert "/probe.so" in Path(f"/proc/{child}/maps").read_text()
         assert "/probe.so" not in Path("/proc/self/maps").read_text()
 
 
@@ -280,6 +284,23 @@ def test_a_library_that_cannot_be_loaded(tmp_path):
         simulate(driven(fmu), step=H, stop=1.0)
 
 
+def test_a_crash_when_the_library_is_loaded(tmp_path, monkeypatch):
+    monkeypatch.setenv("CRASH_AT_LOAD", "1")
+    with pytest.raises(FMUError, match=r"cannot be loaded: crashed with SIGABRT \(.*\) when its library was"):
+        simulate(driven(crash(tmp_path)), step=H, stop=1.0)
+
+
+def test_runs_in_threads(tmp_path):
+    """Each instance finds its own process."""
+    plants = [crash(folder) for folder in (tmp_path / "a", tmp_path / "b", tmp_path / "c")]
+    systems = [
+        System({"plant": FMU(p.path, start={"u": 1.0 + i}, isolated=True)}) for i, p in enumerate(plants)
+    ]
+    with ThreadPoolExecutor(3) as pool:
+        results = list(pool.map(lambda s: simulate(s, step=H, stop=2.0), systems))
+    assert [r["plant.x"][-1] for r in results] == [2.0, 4.0, 6.0]
+
+
 def test_twenty_runs(tmp_path):
     """What they would leave is seen by `nothing_is_left`: a process, a file or memory each."""
     plant = crash(tmp_path)
@@ -327,12 +348,19 @@ def test_the_fmu_ends_with_the_process_that_runs_it(tmp_path):
     script = textwrap.dedent(HANG).replace("1.0, os.kill", "60.0, os.kill")
     parent = subprocess.Popen([sys.executable, "-c", script, str(fmu.path)])
     deadline = time.monotonic() + 30.0
-    while not (host := children(parent.pid)):
+    while not (fmus := children(parent.pid)):
         assert time.monotonic() < deadline, "the FMU's process has not come up"
         time.sleep(0.05)
     time.sleep(0.3)  # until it hangs
     parent.kill()
     parent.wait()
-    while any(Path(f"/proc/{pid}").exists() for pid in host):
+    while any(Path(f"/proc/{pid}").exists() for pid in fmus):
         assert time.monotonic() < deadline, "the FMU's process has outlived its parent"
         time.sleep(0.05)
+
+
+def test_the_c_code_compiles_without_a_warning(tmp_path):
+    options = ["-target", PLATFORMS[host()].target, *LIBRARY_FLAGS, "-Wshadow", "-Werror"]
+    sources = sorted((Path(cosim.__file__).parent / "c").glob("*.c"))
+    done = zig_cc([*options, f"-I{fmi_headers()}", *sources, "-o", tmp_path / "isolation"], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")

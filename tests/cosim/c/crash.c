@@ -1,7 +1,8 @@
 /* An FMI 2.0 FMU that fails on demand: x' = u, y = 2 x; Co-Simulation and Model Exchange.
 
    The GUID of its model description says how: "FUNCTION WAY TIME", such as "DoStep null 0.5", makes
-   fmi2DoStep write to address 0 when the time it was told is 0.5 or later. Before that it logs a line. */
+   fmi2DoStep write to address 0 when the time it was told is 0.5 or later. Before that it logs a line.
+   With CRASH_AT_LOAD in the environment, the library aborts when it is loaded. */
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,6 +30,10 @@ static void crash(P, const char *function) {
     if (strcmp(p->way, "abort") == 0) abort();
     if (strcmp(p->way, "exit") == 0) exit(3);
     while (strcmp(p->way, "hang") == 0) sleep(1);
+}
+
+__attribute__((constructor)) static void at_load(void) {
+    if (getenv("CRASH_AT_LOAD") != NULL) abort();
 }
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
