@@ -5,7 +5,8 @@ fmu-manipulation-toolbox (`pip install structcosim[container]`), which steps the
 steps are those of sampled coupling: in [t_k, t_{k+1}] it steps one FMU after the other, each
 with what the others gave last. So blocks come first, in the order of their connections, and
 read what plants have at t_k; then the plants, each before what it drives, so that all of them
-get the values of t_k or of blocks. A unit conversion is a small FMU of its own on the way.
+get the values of t_k or of blocks. Unit conversions and late connections are small FMUs of
+their own on the way.
 
 Variables are named `participant.variable`: all outputs, parameters, and the inputs that nothing
 feeds. At t_k an output of a plant is that at t_k, an output of a block is that at t_{k-1},
@@ -33,7 +34,7 @@ from cosim.fmu_ports import FMUPort, unit_of
 from cosim.participant import Block
 from cosim.ssp_format import Units
 from cosim.system import Connection, Port, System, is_block
-from cosim.variables import Input, Output, Parameter
+from cosim.variables import Input, Output, Parameter, State
 
 from .description import DefaultExperiment
 from .export import write_archive
@@ -54,6 +55,21 @@ class Conversion(Block):
             self.y[i] = self.factor * self.u[i] + self.offset
 
 
+class Late(Conversion):
+    """y = factor u + offset one step late; stepped before all others, when a block still has its last u"""
+
+    of_block = Parameter(0.0, "1 if a block gives u, 0 if a plant does", fixed=True)
+    kept = State(0.0, "u of the last step", shape="n")
+    started = State(0.0, "1 after the first step")
+
+    def step(self, t: float, h: float) -> None:
+        for i in range(self.u.shape[0]):
+            last = self.u[i] if self.of_block > 0.0 and self.started > 0.0 else self.kept[i]
+            self.y[i] = self.factor * last + self.offset
+            self.kept[i] = self.u[i]
+        self.started = 1.0
+
+
 def export_container(
     system: System,
     path: str | os.PathLike[str],
@@ -66,8 +82,7 @@ def export_container(
     """Write a system as one Co-Simulation FMU that steps its participants every `step` seconds.
 
     A host's communication step is a multiple of `step`. What a container cannot say is refused:
-    connections that are late, blocks with another period than `step`, plants that drive each
-    other, Model Exchange.
+    blocks with another period than `step`, plants that drive each other, Model Exchange, texts.
     """
     target = Path(path)
     _check(system, step)
@@ -89,33 +104,36 @@ def export_container(
 
 
 def _with_conversions(system: System) -> tuple[System, list[str]]:
-    """Return the system with a block for each conversion, and the blocks in their order."""
+    """Return the system with a block for each conversion and delay, and the blocks in their order."""
     wired = System(dict(system.participants))
     before: list[str] = []  # of what plants give
     after: dict[str, list[str]] = {}  # of what blocks give
     for i, c in enumerate(system.connections):
-        if (c.scale, c.offset) == (1.0, 0.0):
+        if (c.scale, c.offset) == (1.0, 0.0) and c.initial is None:
             wired.connect(str(c.source), str(c.target), transformation=(1.0, 0.0))
             continue
         name = f"conversion_{i + 1}"
         while name in wired.participants:
             name += "_"
-        wired.add(name, Conversion(n=c.source.count, factor=c.scale, offset=c.offset))
-        wired.connect(str(c.source), f"{name}.u")
-        wired.connect(f"{name}.y", str(c.target), transformation=(1.0, 0.0))
         source = c.source.participant
-        if is_block(system.participants[source]):
+        of_block = is_block(system.participants[source])
+        values: dict[str, Any] = {"n": c.source.count, "factor": c.scale, "offset": c.offset}
+        if c.initial is not None:
+            wired.add(name, Late(of_block=float(of_block), kept=c.initial, **values))
+        else:
+            wired.add(name, Conversion(**values))
+        if of_block and c.initial is None:
             after.setdefault(source, []).append(name)
         else:
             before.append(name)
+        # the order is made here: `initial` keeps the cycle that a late connection breaks from being refused
+        wired.connect(str(c.source), f"{name}.u", initial=None if c.initial is None else 0.0)
+        wired.connect(f"{name}.y", str(c.target), transformation=(1.0, 0.0))
     blocks = [n for b in system.block_order() for n in (b, *after.get(b, []))]
     return wired, [*before, *blocks]
 
 
 def _check(system: System, step: float) -> None:
-    for c in system.connections:
-        if c.initial is not None:
-            raise ExportError(f"{c} cannot be said in a container; an SSP can (fmus.ssp)")
     for texts in system.text_connections:
         raise ExportError(f"{texts.source} -> {texts.target} is text, which a container does not connect")
     for name, member in system.participants.items():

@@ -41,7 +41,7 @@ from cosim.blocks.sum import WeightedSum
 from cosim.blocks.table_source import TableSource
 from cosim.participant import Participant
 from fmus.benchmark_bridge import benchmark_bridge
-from fmus.container import Conversion
+from fmus.container import Conversion, Late
 from fmus.damped_tower import DampedTower
 from fmus.modal_structure import ModalStructure
 from fmus.nonlinear_structure import NonlinearStructure
@@ -112,6 +112,7 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     FirstOrderActuator: [lambda: FirstOrderActuator(0.03, [0.4, 1.1])],
     AnalogToDigital: [lambda: AnalogToDigital([1.0, 2.0], bits=5)],
     Conversion: [lambda: Conversion(n=2, factor=1e-3, offset=0.5)],
+    Late: [lambda: Late(kept=[1.0, 2.0], factor=3.0), lambda: Late(kept=[1.0, 2.0], of_block=1.0)],
     Delay: [lambda: Delay(3, initial=[1.0, 2.0])],
     MeasurementNoise: [lambda: MeasurementNoise([0.1, 3.0], sample_period=2 * H, seed=2)],
     WhiteNoise: [lambda: WhiteNoise(sample_period=H, seed=5, sigma=[1.0, 2.0], mean=0.5)],

@@ -218,7 +218,7 @@ def files(tmp_path_factory):
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_wiring_comes_back(files, tmp_path, data):
     """Participants, start values, rates, and what feeds every element of every input."""
@@ -258,7 +258,7 @@ def test_any_wiring_comes_back(files, tmp_path, data):
         )  # fmt: skip
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_other_text_is_read_or_refused(tmp_path, data):
     """A changed SSD gives a system or an error of ours, never another one."""
