@@ -172,7 +172,7 @@ TABLE: dict[str, list[Row]] = {
             [f"{F3}::test_units_strings_and_dependencies"],
         ),
         both(
-            "snapshot, restore, branch; who cannot is named",
+            "get, set and serialise state: snapshot, restore, branch; who cannot is named",
             "ours, probe",
             [
                 f"{STATES}::test_a_snapshot_is_returned_to_exactly_and_a_branch_goes_its_own_way",
