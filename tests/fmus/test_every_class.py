@@ -142,8 +142,19 @@ def test_a_controller_interpreted_is_compiled(kind: type[Participant]) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("version", FMI_VERSIONS)
-@pytest.mark.parametrize("make", [whole_tower, highway_bridge, pytest.param(whole_bridge, marks=needs_data)])
+@pytest.mark.parametrize(
+    ("make", "h"),
+    [
+        (whole_tower, 2e-5),  # its highest modes are stiff for ode3
+        (highway_bridge, 1e-3),
+        pytest.param(whole_bridge, 1e-3, marks=needs_data),
+    ],
+)
 def test_a_full_size_participant_leaves(
-    make: Callable[[], Participant], version: str, tmp_path: Path, fmutool_says: Callable[[Path], str]
+    make: Callable[[], Participant],
+    h: float,
+    version: str,
+    tmp_path: Path,
+    fmutool_says: Callable[[Path], str],
 ) -> None:
-    check_leaves(make(), version, tmp_path, fmutool_says, 0.001)
+    check_leaves(make(), version, tmp_path, fmutool_says, h)
