@@ -322,10 +322,13 @@ TABLE: dict[str, list[Row]] = {
         Row(
             "an SSP of ours in ecos, libcosim and FMPy",
             PASS,
-            "no",
+            PASS,
             "ours",
-            ["fmus/test_ssp_elsewhere.py::test_the_same_numbers_elsewhere"],
-            "SSP 1.0; these tools have no arrays, libcosim no FMI 3.0",
+            [
+                "fmus/test_ssp_elsewhere.py::test_the_same_numbers_elsewhere",
+                "fmus/test_ssp_elsewhere.py::test_fmus_of_version_3_in_ecos",
+            ],
+            "SSP 1.0; FMI 3.0 in ecos; these tools have no arrays",
         ),
         both(
             "a whole system as one FMU",

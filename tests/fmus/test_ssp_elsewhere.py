@@ -148,6 +148,17 @@ def test_the_same_numbers_elsewhere(tmp_path, tool, name):
         assert np.abs(theirs[1:, i] - expected[1:]).max() <= bound, port
 
 
+def test_fmus_of_version_3_in_ecos(tmp_path):
+    """Scalars of FMI 3.0 in SSP 1.0: ecos has no arrays, the others no FMI 3.0."""
+    path = export_ssp(at_rest(), tmp_path / "loop.ssp", fmi_version="3.0")
+    plain = read_ssp(path)
+    for fmu in plain.participants.values():
+        assert fmu.description.fmiVersion == "3.0"
+        fmu.as_block = False
+    ours = simulate(plain, step=H, stop=N * H)["mass.x"]
+    assert np.abs(ecos(str(path), ["mass.x"])[:, 0] - ours).max() <= 1e-12 * np.abs(ours).max()
+
+
 @pytest.mark.parametrize("name", LOOPS)
 def test_the_delay_that_a_jacobi_master_adds(tmp_path, name):
     """One step for each block in the loop: our sampled loop with what leaves a block one step late."""
