@@ -378,7 +378,7 @@ TABLE: dict[str, list[Row]] = {
             [
                 f"{DOCTOR}::test_a_fault_is_found",
                 f"{DOCTOR}::test_what_takes_the_process_with_it_is_found",
-                "test_conformance.py::test_the_doctor_on_fmus_that_are_not_ours",
+                "test_conformance.py::test_the_doctor_on_fmus_of_fmi_3_that_are_not_ours",
             ],
         ),
         both("report, `--json`, exit code by the worst finding", "bad", [f"{DOCTOR}::test_the_command_line"]),
