@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .errors import CosimError, SnapshotError
+from .errors import CosimError, FMUError, SnapshotError
 from .fmu import FMU
 from .fmu_ports import FMUPort
 from .instances import Failures, buffer, ctrl_c
@@ -76,7 +76,7 @@ class FMUInstance:
         except CosimError:
             self.stop()
             raise
-        self.inputs = self._exchanges(fmu.input_ports)
+        self.inputs = self._exchanges({n: p for n, p in fmu.input_ports.items() if n in used})
         self.outputs = self._exchanges({n: p for n, p in fmu.output_ports.items() if n in used})
         #: the strings and binary data that were got last, by output (None before), and set last, by input
         self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}
@@ -105,8 +105,14 @@ class FMUInstance:
         self.running = True
         for x in self.inputs:
             if not (x.is_clock or x.clocks):
-                x.values[:] = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
-                x.told[:] = x.values
+                now = self.fmi.get(x.access, x.references.tolist(), len(x.elements))
+                x.values[:] = x.told[:] = now
+                for element, value, held in zip(x.elements, now, x.values.tolist(), strict=True):
+                    if value != held:
+                        raise FMUError(
+                            f"{self.name}.{element} starts with {value}, which is above 2^53, and a float "
+                            "does not hold it; do not connect or record it"
+                        )
 
     def _settle(self, t0: float) -> None:
         """Do what is left to initialization mode."""

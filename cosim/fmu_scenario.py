@@ -14,7 +14,7 @@ import numpy as np
 from .display_units import has_unit
 from .errors import FMUError, TimeError, did_you_mean
 from .fmu import FMU, Interface, Solver
-from .input_table import connect_inputs
+from .input_table import connect_inputs, start_from_inputs
 from .master import simulate
 from .result import Result
 from .scenario import Scenario
@@ -113,6 +113,7 @@ def fmu_scenario(path: Path) -> Scenario:
         fmu = system.participants[name]
         assert isinstance(fmu, FMU)
         begin, end, h = _times(fmu, start_time, stop, step)
+        start_from_inputs(system, name, begin)
         wanted = list(record) or [*fmu.declared_outputs]
         recorded = [f"{name}.{variable}" for variable in wanted]
         return simulate(system, step=h, start=begin, stop=end, record=recorded, progress=progress)

@@ -7,7 +7,8 @@
 The first column is the time in s; the others are named as inputs or elements of arrays.
 Continuous inputs are linear between the rows, the others are held; two rows at one time
 are a jump. The cell of an array has its elements with blanks between them. Between
-communication points every input is held, as sampled coupling says.
+communication points every input is held, as sampled coupling says; the FMU is initialized
+with the values at the start.
 """
 
 from __future__ import annotations
@@ -50,6 +51,20 @@ def connect_inputs(system: System, name: str, path: Path) -> None:
         source = TableSource(instants, rows, interpolation="linear" if continuous else "hold", unit=port.unit)
         system.add(f"input_{column}", source)
         system.connect(f"input_{column}.y", f"{name}.{input_name}")
+
+
+def start_from_inputs(system: System, name: str, t: float) -> None:
+    """Let inputs that are fed from a file have their value at t at the start, unless one is given."""
+    fmu = system.participants[name]
+    assert isinstance(fmu, FMU)
+    for c in system.connections:
+        source = system.participants[c.source.participant]
+        variable = f"{c.target.name}{c.target.index}"
+        if isinstance(source, TableSource) and (not c.target.index or variable in fmu.variables):
+            first = source.fresh()
+            assert isinstance(first, TableSource)
+            first.step(t, 0.0)
+            fmu.start.setdefault(variable, first.y.tolist() if c.target.count > 1 else float(first.y[0]))
 
 
 def _read(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:

@@ -90,6 +90,11 @@ class Participant:
         for name, variable in cls._declared.items():
             if cls._is_reserved(name):
                 raise DeclarationError(f"{cls.__name__}: '{name}' is a name of structcosim's own; rename it")
+            if not isinstance(variable.meaning, str):
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: its meaning is {variable.meaning!r}, which is no text; "
+                    "write a start value as start="
+                )
             if variable.kind == "derivative":
                 setattr(cls, name, variable)
         for name in cls.KERNELS:

@@ -309,6 +309,8 @@ def test_declarations_that_cannot_work_are_refused():
         define("A", Continuous, x=State(), der_x=Output())
     with pytest.raises(DeclarationError, match="derive from Continuous"):
         define("A", derivatives=lambda self, t: None)
+    with pytest.raises(DeclarationError, match=r"A\.u: its meaning is 1\.0.*start="):
+        define("A", u=Input(1.0))
     with pytest.raises(DeclarationError, match=r"A has no step\(self, t, h\)"):
         define("A")()
     with pytest.raises(DeclarationError, match=r"A has no derivatives\(self, t\)"):

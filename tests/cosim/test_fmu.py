@@ -81,7 +81,7 @@ def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
     ("start", "words"),
     [
         ({"kk": 1.0}, "no variable 'kk'; did you mean 'k'"),
-        ({"k": "stiff"}, "start value k = 'stiff' is no Real"),
+        ({"k": "stiff"}, "start value k = 'stiff' is no number with a unit"),
         ({"k": np.nan}, "is no Real"),
         ({"u": [1.0, 2.0, 3.0]}, r"is no Real of shape \(2,\)"),
     ],

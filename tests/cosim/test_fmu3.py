@@ -22,7 +22,7 @@ from cosim import (
     System,
     simulate,
 )
-from cosim.errors import FMUError, SimulationError, WiringError
+from cosim.errors import CosimError, FMUError, SimulationError, WiringError
 from cosim.inspection import inspection
 from fmus.export import export
 
@@ -223,7 +223,7 @@ def test_numbers_of_all_widths_at_their_limits(probes):
     low = {f"Int{bits}_in": -(2 ** (bits - 1)) for bits in (8, 16, 32)} | {"Int64_in": -(2**53) - 1}
     result = simulate(System({"p": FMU(probes["3.0"], start=low)}), step=H, stop=2 * H)
     for name, value in low.items():
-        assert result[f"p.{name.replace('_in', '_out')}"][-1] == value + 1.0
+        assert int(result[f"p.{name.replace('_in', '_out')}"][-1]) == value + 1  # as integers, above 2^53 too
 
 
 @pytest.mark.parametrize("kind", ["Int64", "UInt64"])
@@ -231,6 +231,12 @@ def test_a_number_above_2_53_is_not_rounded(probes, kind):
     fmu = FMU(probes["3.0"], start={f"{kind}_in": 2**53})
     with pytest.raises(SimulationError, match=rf"p\.{kind}_out is above 2\^53"):
         simulate(System({"p": fmu}), step=H, stop=H, record=[f"p.{kind}_out"])
+
+
+def test_an_input_above_2_53_that_is_recorded_is_not_rounded(probes):
+    fmu = FMU(probes["3.0"], start={"Int64_in": 2**53 + 1})
+    with pytest.raises(CosimError, match=r"p\.Int64_in starts with 9007199254740993.* a float"):
+        simulate(System({"p": fmu}), step=H, stop=H, record=["p.Int64_in"])
 
 
 @pytest.mark.parametrize("kind", ["Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32"])
