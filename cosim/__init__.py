@@ -4,7 +4,7 @@ from cosim import Block, Continuous, FMU, Input, Output, Parameter, State, Syste
 """
 
 from .errors import CosimError, SimulationEndedWarning
-from .fmu import FMU
+from .fmi.fmu import FMU
 from .master import schedule, simulate
 from .participant import Block, Continuous, LinearContinuous
 from .result import Result

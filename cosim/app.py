@@ -249,7 +249,7 @@ def _export_system(
 @_app.command(name="inspect")
 def inspect_fmu(fmu: Path) -> None:
     """Show what an FMU is: capabilities, default experiment, variables with units and start values."""
-    from .inspection import inspection
+    from .fmi.inspection import inspection
 
     print(inspection(fmu))
 

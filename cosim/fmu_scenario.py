@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from .display_units import has_unit
 from .errors import FMUError, TimeError, did_you_mean
-from .fmu import FMU, Interface, Solver
+from .fmi.display_units import has_unit
+from .fmi.fmu import FMU, Interface, Solver
 from .input_table import connect_inputs, start_from_inputs
 from .master import simulate
 from .result import Result

@@ -22,7 +22,7 @@ import numpy as np
 
 from .blocks.table_source import TableSource
 from .errors import RecordError, did_you_mean
-from .fmu import FMU
+from .fmi.fmu import FMU
 from .system import System
 
 _WORDS = {"true": 1.0, "false": 0.0}

@@ -3,7 +3,7 @@
 An instance answers, for its participant, what the master asks at a communication point:
 `read` the outputs, `latch` the inputs, `advance` over the step, and for stage coupling
 set states and get derivatives. KernelInstance does so for blocks and continuous systems
-in the loop; FMUInstance (fmu_instance.py, model_exchange.py) for FMUs.
+in the loop; FMUInstance (fmi/instance.py, fmi/model_exchange.py) for FMUs.
 """
 
 from __future__ import annotations

@@ -21,14 +21,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .co_simulation import CoSimulationInstance
 from .errors import SimulationError, WiringError
-from .fmu import FMU
-from .fmu_instance import FMUInstance
+from .fmi.co_simulation import CoSimulationInstance
+from .fmi.fmu import FMU
+from .fmi.instance import FMUInstance
+from .fmi.model_exchange import ModelExchangeInstance
+from .fmi.text_ports import TextPort
 from .instances import Failures, KernelInstance, buffer
 from .iterated import IteratedCoupling
 from .loop import Loop
-from .model_exchange import ModelExchangeInstance
 from .opcodes import (
     CALL,
     COMBINE,
@@ -45,7 +46,6 @@ from .opcodes import (
 from .participant import Block, Continuous
 from .system import Connection, Port, System, cycle_text, is_block
 from .tableaus import TABLEAUS
-from .text_ports import TextPort
 from .time_grid import steps_between
 from .variables import Array
 

@@ -28,7 +28,7 @@ from types import ModuleType
 from typing import Any
 
 from .errors import CosimError, WiringError, did_you_mean
-from .fmu import FMU
+from .fmi.fmu import FMU
 from .participant import Participant
 from .result import Result
 

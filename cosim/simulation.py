@@ -36,14 +36,14 @@ from .errors import (
     WiringError,
     did_you_mean,
 )
-from .fmu import FMU
+from .fmi.fmu import FMU
+from .fmi.text_ports import TextPort, text_port
 from .instances import EndOfRun, ctrl_c
 from .loop import Loop
 from .program import Program
 from .result import Result, Statistics
 from .system import Port, System, inputs_of, outputs_of
 from .tableaus import TABLEAUS
-from .text_ports import TextPort, text_port
 from .time_grid import steps_between
 from .variables import Array
 

@@ -11,7 +11,7 @@ from .master import simulate
 from .result import Result
 from .scenario import Scenario, ScenarioError, find_part
 from .simulation import Coupling, Solver
-from .ssp import Package, read_package
+from .ssp.reader import Package, read_package
 from .system import System
 
 

@@ -23,9 +23,9 @@ from typing import TypeAlias
 import numpy as np
 
 from .errors import WiringError, did_you_mean
-from .fmu import FMU
+from .fmi.fmu import FMU
+from .fmi.text_ports import TextConnection, text_connection
 from .participant import Block, Participant
-from .text_ports import TextConnection, text_connection
 from .units import conversion
 from .variables import Array
 

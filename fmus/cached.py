@@ -14,7 +14,7 @@ from pathlib import Path
 
 from cosim import c_compiler
 from cosim.compiler import cache_directory, kernel_key
-from cosim.fmu import FMU
+from cosim.fmi.fmu import FMU
 from cosim.participant import Participant
 
 from .export import export

@@ -29,10 +29,10 @@ from typing import Any
 
 from lxml import etree
 
-from cosim.fmu import FMU
-from cosim.fmu_ports import FMUPort, unit_of
+from cosim.fmi.fmu import FMU
+from cosim.fmi.ports import FMUPort, unit_of
 from cosim.participant import Block
-from cosim.ssp_format import Units
+from cosim.ssp.format import Units
 from cosim.system import Connection, Port, System, is_block
 from cosim.variables import Input, Output, Parameter, State
 

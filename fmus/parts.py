@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import CosimError
-from cosim.fmi2 import Fmi2
-from cosim.fmi3 import Fmi3
-from cosim.fmu import FMU
-from cosim.fmu_ports import FMUPort, Shape, ports
-from cosim.model_description import read_description
+from cosim.fmi.fmi2 import Fmi2
+from cosim.fmi.fmi3 import Fmi3
+from cosim.fmi.fmu import FMU
+from cosim.fmi.model_description import read_description
+from cosim.fmi.ports import FMUPort, Shape, ports
 from cosim.system import Member, System
 
 from .export import export

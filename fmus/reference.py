@@ -29,7 +29,7 @@ from fmpy import extract, read_model_description
 from fmpy.simulation import instantiate_fmu
 from lxml import etree
 
-from cosim.fmi2_log import callbacks
+from cosim.fmi.fmi2_log import callbacks
 from cosim.participant import Participant
 from cosim.variables import Array
 

@@ -7,7 +7,7 @@ SSP 1.0 is written unless the system needs 2.0: arrays as connectors, or types o
 A conversion of units is written as a linear transformation that takes its place, so that a
 tool that knows no units computes the same. What SSP has no words for (which participants act
 as blocks, with which period, which connections are late, the step) is in annotations
-(cosim/ssp_format.py), with which `cosim.ssp.read_ssp` gives the system back.
+(cosim/ssp/format.py), with which `cosim.ssp.read_ssp` gives the system back.
 
 Other masters exchange all values at the communication points and then step all FMUs (Jacobi),
 blocks as well: there, every FMU of a block between two others makes their loop one
@@ -25,10 +25,11 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from cosim.fmu import DEFAULT_TOLERANCE, FMU
-from cosim.fmu_ports import FMUPort, unit_of
+from cosim.fmi.fmu import DEFAULT_TOLERANCE, FMU
+from cosim.fmi.ports import FMUPort, unit_of
+from cosim.fmi.text_ports import TextPort
 from cosim.participant import Block
-from cosim.ssp_format import (
+from cosim.ssp.format import (
     ANNOTATION,
     FMU_TYPE,
     NAMESPACES,
@@ -44,7 +45,6 @@ from cosim.ssp_format import (
     tag,
 )
 from cosim.system import Connection, Member, Port, System
-from cosim.text_ports import TextPort
 
 from .export import write_archive
 from .link import ExportError

@@ -15,16 +15,16 @@ PASS, NONE = "pass", "–"
 #: where the FMUs come from: name -> file and what it has
 FMUS = {
     "ours": ("fmus/export.py", "plants and blocks of ours, exported"),
-    "probe": ("tests/cosim/c/probe.h", "C; all types, events, arrays, structural parameters"),
-    "ball": ("tests/cosim/c/ball2.c", "C; Model Exchange with state and time events, failures on demand"),
+    "probe": ("tests/cosim/fmi/c/probe.h", "C; all types, events, arrays, structural parameters"),
+    "ball": ("tests/cosim/fmi/c/ball2.c", "C; Model Exchange with state and time events, failures on demand"),
     "metronome": (
-        "tests/cosim/c/metronome.c",
+        "tests/cosim/fmi/c/metronome.c",
         "C; FMI 3.0 Co-Simulation with event mode, clocks, strings, binary data",
     ),
     "pythonfmu": ("tests/others.py", "made by pythonfmu 0.7 (FMI 2.0) and pythonfmu3 0.3 (FMI 3.0)"),
-    "crash": ("tests/cosim/c/crash.c", "C; ends its process in any call"),
-    "bad": ("tests/cosim/c/bad.c", "C; good or with one of the faults that the doctor looks for"),
-    "broken": ("tests/cosim/test_archive.py", "damaged and hostile archives and descriptions"),
+    "crash": ("tests/cosim/fmi/c/crash.c", "C; ends its process in any call"),
+    "bad": ("tests/cosim/fmi/c/bad.c", "C; good or with one of the faults that the doctor looks for"),
+    "broken": ("tests/cosim/fmi/test_archive.py", "damaged and hostile archives and descriptions"),
 }
 
 
@@ -48,11 +48,11 @@ def only3(feature: str, fmus: str, tests: list[str], note: str = "") -> Row:
     return Row(feature, NONE, PASS, fmus, tests, note)
 
 
-F3, ME = "cosim/test_fmu3.py", "cosim/test_model_exchange.py"
-EVENTS, STATES = "cosim/test_co_simulation_events.py", "cosim/test_simulation.py"
+F3, ME = "cosim/fmi/test_fmu3.py", "cosim/fmi/test_model_exchange.py"
+EVENTS, STATES = "cosim/fmi/test_co_simulation_events.py", "cosim/test_simulation.py"
 
-ISOLATED, EXAMPLES = "cosim/test_isolation.py", "scenarios/test_examples.py"
-UNITS, DOCTOR = "cosim/test_start_units.py", "cosim/test_doctor.py"
+ISOLATED, EXAMPLES = "cosim/fmi/test_isolation.py", "scenarios/test_examples.py"
+UNITS, DOCTOR = "cosim/fmi/test_start_units.py", "cosim/test_doctor.py"
 
 TABLE: dict[str, list[Row]] = {
     "In": [
@@ -67,7 +67,7 @@ TABLE: dict[str, list[Row]] = {
             "pythonfmu, metronome",
             [
                 f"{EXAMPLES}::test_a_controller_on_somebody_elses_plant",
-                "cosim/test_loading.py::test_an_fmu_that_needs_its_tool_says_so",
+                "cosim/fmi/test_loading.py::test_an_fmu_that_needs_its_tool_says_so",
             ],
         ),
         both(
@@ -107,13 +107,16 @@ TABLE: dict[str, list[Row]] = {
             "probe, metronome",
             [
                 f"{F3}::test_units_strings_and_dependencies",
-                "cosim/test_text_ports.py::test_texts_of_both_versions",
+                "cosim/fmi/test_text_ports.py::test_texts_of_both_versions",
             ],
         ),
         only3(
             "binary data, as start values and from FMU to FMU",
             "probe, metronome",
-            [f"{F3}::test_binary_start_values", "cosim/test_text_ports.py::test_texts_go_from_fmu_to_fmu"],
+            [
+                f"{F3}::test_binary_start_values",
+                "cosim/fmi/test_text_ports.py::test_texts_go_from_fmu_to_fmu",
+            ],
         ),
         only3(
             "arrays as ports with shapes; structural parameters in configuration mode",
@@ -130,9 +133,9 @@ TABLE: dict[str, list[Row]] = {
             "clocks, periodic and triggered, in and out",
             "metronome",
             [
-                "cosim/test_clocks.py::test_periodic_clocks",
-                "cosim/test_clocks.py::test_a_triggered_input_clock_ticks_when_it_is_not_0",
-                "cosim/test_clocks.py::test_an_output_clock_reads_1_when_it_has_ticked_since_the_last_point",
+                "cosim/fmi/test_clocks.py::test_periodic_clocks",
+                "cosim/fmi/test_clocks.py::test_a_triggered_input_clock_ticks_when_it_is_not_0",
+                "cosim/fmi/test_clocks.py::test_an_output_clock_reads_1_when_it_has_ticked_since_the_last_point",
             ],
             "Co-Simulation",
         ),
@@ -145,13 +148,13 @@ TABLE: dict[str, list[Row]] = {
         both(
             "instances of one FMU share an extraction",
             "ours",
-            ["cosim/test_archive.py::test_fmus_of_one_file_share_a_folder_while_there_is_one"],
+            ["cosim/fmi/test_archive.py::test_fmus_of_one_file_share_a_folder_while_there_is_one"],
         ),
         both(
             "start values and parameters by name",
             "ours, probe",
             [
-                "cosim/test_fmu.py::test_start_values_of_parameters_and_of_inputs_that_nothing_feeds",
+                "cosim/fmi/test_fmu.py::test_start_values_of_parameters_and_of_inputs_that_nothing_feeds",
                 f"{F3}::test_units_strings_and_dependencies",
             ],
         ),
@@ -186,8 +189,8 @@ TABLE: dict[str, list[Row]] = {
             "damaged and hostile archives are an error",
             "broken",
             [
-                "cosim/test_archive.py::test_a_path_out_of_the_folder",
-                "cosim/test_fuzzed_fmu.py::test_changed_archives",
+                "cosim/fmi/test_archive.py::test_a_path_out_of_the_folder",
+                "cosim/fmi/test_fuzzed_fmu.py::test_changed_archives",
             ],
         ),
         Row("Scheduled Execution", NONE, "no", "", [], "a master with fixed steps has no scheduler to offer"),
@@ -311,7 +314,7 @@ TABLE: dict[str, list[Row]] = {
             "ours",
             [
                 "fmus/test_ssp.py::test_the_same_bits_after_the_way_through_a_file",
-                "cosim/test_ssp.py::test_values_come_from_files_through_mappings_and_prefixes",
+                "cosim/ssp/test_ssp.py::test_values_come_from_files_through_mappings_and_prefixes",
             ],
         ),
         both(

@@ -22,8 +22,8 @@ from cosim.errors import SimulationError
 from fmus.export import export
 from fmus.oscillator import Oscillator
 from tests.conformance import FMUS, NONE, PASS, TABLE, Row, cited, markdown, rows
-from tests.cosim.probe import probe
-from tests.cosim.test_isolation import children
+from tests.cosim.fmi.probe import probe
+from tests.cosim.fmi.test_isolation import children
 from tests.fmus.host import building
 from tests.others import swing
 

@@ -10,7 +10,7 @@ import json
 import sys
 
 from ..errors import CosimError
-from ..fmu import FMU
+from ..fmi.fmu import FMU
 from .examination import PROBES
 
 

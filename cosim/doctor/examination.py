@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from ..archive import Archive
 from ..errors import CosimError, FMUError, did_you_mean
-from ..fmu import FMU
+from ..fmi.archive import Archive
+from ..fmi.fmu import FMU
 from . import misuse, probes
 from .report import Finding, Report
 

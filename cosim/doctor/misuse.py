@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import count
 from typing import Any
 
-from ..fmu import FMU
+from ..fmi.fmu import FMU
 from .probes import Doing, Verdict
 from .subject import Subject
 

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..fmu import FMU
-from ..fmu_ports import FMUPort, unit_of
+from ..fmi.fmu import FMU
+from ..fmi.ports import FMUPort, unit_of
 from .memory import handles, memory
 from .subject import STEPS, CosimError, Subject, Values, difference, same
 

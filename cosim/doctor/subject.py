@@ -9,11 +9,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..continuous_time import ContinuousTime
 from ..errors import CosimError, FMUError
-from ..fmu import FMU
-from ..fmu_events import EVENT_ITERATIONS
-from ..fmu_ports import FMUPort
+from ..fmi.continuous_time import ContinuousTime
+from ..fmi.events import EVENT_ITERATIONS
+from ..fmi.fmu import FMU
+from ..fmi.ports import FMUPort
 from ..instances import Failures
 
 #: values of ports by name, as the FMU gives them

@@ -15,7 +15,7 @@ from cosim.errors import CosimError
 from fmus.export import export
 from tests.fmus.host import PARTICIPANTS
 
-from .probe import changed, probe, write_fmu
+from .fmi.probe import changed, probe, write_fmu
 
 CS, ME = "Co-Simulation", "Model Exchange"
 VARIABLES = """

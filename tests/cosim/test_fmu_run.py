@@ -22,10 +22,10 @@ from cosim.input_table import connect_inputs
 from fmus.description import DefaultExperiment
 from fmus.export import export
 
-from .ball import ball
-from .probe import probe
-from .test_fmu import Chain
-from .test_isolation import crash
+from .fmi.ball import ball
+from .fmi.probe import probe
+from .fmi.test_fmu import Chain
+from .fmi.test_isolation import crash
 
 
 @pytest.fixture(scope="module")

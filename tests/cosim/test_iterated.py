@@ -21,8 +21,8 @@ from cosim.errors import SimulationError, TimeError, WiringError
 from cosim.quasi_newton import NoConvergence, QuasiNewton
 from fmus.export import export
 
+from .fmi.probe import probe
 from .parts import Gain, Mass, Ramp
-from .probe import probe
 
 
 class Structure(LinearContinuous):

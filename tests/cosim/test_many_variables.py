@@ -6,9 +6,9 @@ import pytest
 
 from cosim import FMU, System, simulate
 from cosim.errors import FMUError
-from cosim.inspection import inspection
+from cosim.fmi.inspection import inspection
 
-from .probe import write_fmu
+from .fmi.probe import write_fmu
 
 
 def many(path, n):

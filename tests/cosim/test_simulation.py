@@ -12,9 +12,9 @@ from cosim.blocks import SensorDynamics, WhiteNoise
 from cosim.errors import SimulationError, SnapshotError, TimeError
 from fmus.export import export
 
+from .fmi.probe import probe
+from .fmi.test_fmu import Chain
 from .parts import Gain, Mass
-from .probe import probe
-from .test_fmu import Chain
 
 
 class Remembers(Block):

@@ -11,7 +11,7 @@ import pyssp_standard
 from lxml import etree
 
 from cosim import Block, Continuous, Input, Output, Parameter, State, System
-from cosim.ssp_format import NAMESPACES
+from cosim.ssp.format import NAMESPACES
 
 _SCHEMAS = {
     "1.0": Path(fmpy.__file__).parent / "ssp" / "schema",

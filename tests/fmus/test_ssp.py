@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from cosim import FMU, Block, Input, Output, System, simulate
 from cosim.errors import CosimError, WiringError
-from cosim.ssp import Experiment, read_package, read_ssp
-from cosim.ssp_format import NAMESPACES, SSPError
+from cosim.ssp.format import NAMESPACES, SSPError
+from cosim.ssp.reader import Experiment, read_package, read_ssp
 from fmus.export import export
 from fmus.ssp import export_ssp
 from scenarios.chattering import build

@@ -1,0 +1,171 @@
+"""What the reader and the writer of SSP share: namespaces, our annotations, units, XML.
+
+SSP does not say when a component acts, nor with which step a system is run. That is in
+annotations of our own, which other tools skip (SSP 1.0, 4.2: unknown types are ignored):
+
+    on a component     <participant kind="block" every="2" samplePeriod="0.01"/>
+                       <participant solver="cvode" tolerance="1e-8" substeps="4" eventMode="true"
+                                    isolated="true"/>
+    on a connection    <delay initial="0.5 1.0"/>             one communication step late
+    on the experiment  <experiment step="0.01" coupling="sampled" solver="ode3"/>
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from lxml import etree
+
+from ..errors import CosimError, WiringError
+from ..units import conversion
+
+SSD, SSC, SSV, SSM, SSB, OWN = "ssd", "ssc", "ssv", "ssm", "ssb", "structcosim"
+_SSP = "http://ssp-standard.org/SSP1/SystemStructure"
+NAMESPACES = {
+    SSD: f"{_SSP}Description",
+    SSC: f"{_SSP}Common",
+    SSV: f"{_SSP}ParameterValues",
+    SSM: f"{_SSP}ParameterMapping",
+    SSB: f"{_SSP}SignalDictionary",
+    OWN: "urn:structcosim:ssp:1",
+}
+ANNOTATION = "structcosim"
+VERSIONS = ("1.0", "2.0")
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+ROOT = "SystemStructure.ssd"
+#: element of SSP 1.0 for a type of FMI; SSP 2.0 has those of FMI 3.0 by their own names
+TYPES_1 = {
+    "Real": "Real",
+    "Float64": "Real",
+    "Integer": "Integer",
+    "Int32": "Integer",
+    "Boolean": "Boolean",
+    "String": "String",
+    "Enumeration": "Enumeration",
+    "Binary": "Binary",
+}
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+#: (exponents of the base units, factor, offset)
+Definition: TypeAlias = tuple[tuple[int, ...], float, float]
+
+
+class SSPError(CosimError):
+    """An SSP that cannot be read or written: where, what is in it, and what is supported."""
+
+
+def tag(prefix: str, name: str) -> str:
+    """Return the qualified name of an element, as lxml writes it."""
+    return f"{{{NAMESPACES[prefix]}}}{name}"
+
+
+def parse_xml(text: bytes, where: str) -> etree._Element:
+    """Parse XML from another hand: entities are not expanded, nothing else is loaded."""
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
+    )
+    try:
+        root = etree.fromstring(text, parser)
+    except etree.XMLSyntaxError as error:
+        raise SSPError(f"{where} is broken XML: {error}") from None
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise SSPError(f"{where} has a document type declaration (DTD), which SSP does not use; remove it")
+    return root
+
+
+def own_annotation(element: etree._Element, prefix: str, name: str) -> Mapping[str, str]:
+    """Return the attributes of our annotation `name` of an element, none if it has none."""
+    place = f"{prefix}:Annotations/{SSC}:Annotation[@type='{ANNOTATION}']/{OWN}:{name}"
+    found = element.find(place, NAMESPACES)
+    return {} if found is None else {str(k): str(v) for k, v in found.attrib.items()}
+
+
+def numbers(text: str, where: str) -> list[float]:
+    """Return a list of numbers as XML Schema writes it."""
+    try:
+        return [float(_INFINITE.get(part, part)) for part in text.split()]
+    except ValueError:
+        raise SSPError(f"{where}: '{text}' is no list of numbers") from None
+
+
+def number(text: str, where: str) -> float:
+    """Return one number."""
+    found = numbers(text, where)
+    if len(found) != 1:
+        raise SSPError(f"{where}: '{text}' is not one number")
+    return found[0]
+
+
+def factor_and_offset(element: etree._Element, where: str) -> tuple[float, float]:
+    """Return the attributes of a LinearTransformation or a BaseUnit."""
+    return number(element.get("factor", "1"), where), number(element.get("offset", "0"), where)
+
+
+_INFINITE = {"INF": "inf", "-INF": "-inf"}
+
+
+def flag(text: str | None) -> bool:
+    """Return an xs:boolean; false by default."""
+    return text in ("true", "1")
+
+
+@dataclass
+class Units:
+    """The units that a file defines, and conversions; names that it does not define are known to pint."""
+
+    definitions: dict[str, Definition] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, parent: etree._Element, prefix: str, where: str) -> Units:
+        """Read the `Units` of a file."""
+        found = cls()
+        for unit in parent.iterfind(f"{prefix}:Units/{SSC}:Unit", NAMESPACES):
+            base = unit.find(f"{SSC}:BaseUnit", NAMESPACES)
+            if base is not None:
+                place = f"{where}, unit '{unit.get('name')}'"
+                exponents = [number(base.get(n, "0"), place) for n in BASE_UNITS]
+                factor, offset = factor_and_offset(base, place)
+                if not all(map(math.isfinite, (*exponents, 1.0 / factor if factor else math.inf, offset))):
+                    raise SSPError(f"{place}: its exponents, factor {factor} and offset {offset} are no unit")
+                found.definitions[unit.get("name", "")] = (tuple(map(int, exponents)), factor, offset)
+        return found
+
+    def add_fmu(self, description: Any) -> None:
+        """Add the units that an FMU defines; a definition that is there already stays."""
+        for unit in description.unitDefinitions or []:
+            base = unit.baseUnit
+            if base is not None:
+                exponents = tuple(int(getattr(base, n)) for n in BASE_UNITS)
+                self.definitions.setdefault(unit.name, (exponents, float(base.factor), float(base.offset)))
+
+    def attributes(self, name: str) -> dict[str, str]:
+        """Return the attributes of a unit's BaseUnit, in SSP as in FMI."""
+        exponents, factor, offset = self.definitions[name]
+        found = {n: str(e) for n, e in zip(BASE_UNITS, exponents, strict=True) if e}
+        found |= {"factor": repr(factor)} if factor != 1.0 else {}
+        return found | ({"offset": repr(offset)} if offset != 0.0 else {})
+
+    def convert(self, source: str | None, target: str | None) -> tuple[float, float]:
+        """Return (factor, offset) with `value in target = factor * value in source + offset`."""
+        if source is None or target is None or source == target:
+            return 1.0, 0.0
+        if source not in self.definitions or target not in self.definitions:
+            return conversion(source, target)
+        a, b = self.definitions[source], self.definitions[target]
+        if a[0] != b[0]:
+            raise WiringError(f"'{source}' ({_si(a)}) is not convertible to '{target}' ({_si(b)})")
+        return a[1] / b[1], (a[2] - b[2]) / b[1]
+
+
+def _si(definition: Definition) -> str:
+    parts = [f"{n}^{e}" if e != 1 else n for n, e in zip(BASE_UNITS, definition[0], strict=True) if e]
+    return " ".join(parts) or "1"
+
+
+def element_name(path: tuple[str, ...]) -> str:
+    """Return the participant's name for an element of nested systems: dots and the like are underscores."""
+    name = re.sub(r"\W", "_", "_".join(path))
+    return name if re.match(r"[A-Za-z_]", name) else f"_{name}"

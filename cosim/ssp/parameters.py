@@ -1,0 +1,188 @@
+"""Parameter values of an SSP (SSV, SSM): which value a connector or variable starts with.
+
+Bindings of a component name its variables, bindings of a system those of its elements by
+`element.variable`, or its own connectors. A later binding wins over an earlier one, that of a
+system over that of its elements. Values for names that are not there are ignored, as the
+standard has it (SSP 2.0, 5.2.3), so that one set may serve many systems.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from .format import (
+    NAMESPACES,
+    SSC,
+    SSD,
+    SSM,
+    SSV,
+    SSPError,
+    Units,
+    factor_and_offset,
+    flag,
+    numbers,
+    parse_xml,
+    tag,
+)
+from .structure import Element, Node
+
+_REALS = {"Real", "Float64", "Float32"}
+_INTEGERS = {"Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter value in the unit that its file gives; `kind` is the type there."""
+
+    kind: str
+    value: Any
+    unit: str | None
+    units: Units
+    factor: float = 1.0
+    offset: float = 0.0
+    keep_unit: bool = False
+
+    def in_unit(self, unit: str | None, units: Units) -> Any:
+        """Return the value in a variable's unit, with the transformations on the way."""
+        if self.kind not in _REALS:
+            return self.value
+        known = Units(units.definitions | self.units.definitions)
+        scale, shift = (1.0, 0.0) if self.keep_unit else known.convert(self.unit, unit)
+        if (scale, shift, self.factor, self.offset) == (1.0, 0.0, 1.0, 0.0):
+            return self.value
+        return (self.factor * (scale * np.asarray(self.value) + shift) + self.offset).tolist()
+
+
+class Parameters:
+    """The start values that the bindings of all elements give, by connector or variable."""
+
+    def __init__(self, root: Element, read: Callable[[str, str], bytes], where: str) -> None:
+        self.read = read
+        self.where = where
+        self.values: dict[Node, Value] = {}
+        self._bind(root)
+
+    def of(self, element: Element) -> dict[str, Value]:
+        """Return the values for the variables of a component."""
+        return {node.name: value for node, value in self.values.items() if node.path == element.path}
+
+    def _bind(self, element: Element) -> None:
+        for child in element.children.values():
+            self._bind(child)
+        for binding in element.xml.iterfind(f"{SSD}:ParameterBindings/{SSD}:ParameterBinding", NAMESPACES):
+            for name, value in self._binding(element, binding):
+                for node in _nodes(element, name):
+                    self.values[node] = value
+
+    def _binding(self, element: Element, binding: etree._Element) -> Iterator[tuple[str, Value]]:
+        where = f"{self.where}: parameter binding of {'.'.join(element.path) or 'the root system'}"
+        values = self._document(binding, "ParameterValues", SSV, "ParameterSet", where)
+        if values is None:
+            raise SSPError(f"{where} has neither a source nor values")
+        units = Units.of(values, SSV, where)
+        prefix = binding.get("prefix", "")
+        given = {
+            prefix + p.get("name", ""): _value(p, units, f"{where}, parameter '{p.get('name')}'")
+            for p in values.iterfind(f"{SSV}:Parameters/{SSV}:Parameter", NAMESPACES)
+        }
+        mapped = binding.find(f"{SSD}:ParameterMapping", NAMESPACES)
+        if mapped is None:
+            yield from given.items()
+            return
+        mapping = self._document(mapped, None, SSM, "ParameterMapping", where)
+        for entry in () if mapping is None else mapping.iterfind(f"{SSM}:MappingEntry", NAMESPACES):
+            name = entry.get("source", "")
+            if name in given:
+                yield entry.get("target", ""), _mapped(given[name], entry, f"{where}, mapping of '{name}'")
+
+    def _document(
+        self, element: etree._Element, inside: str | None, prefix: str, name: str, where: str
+    ) -> etree._Element | None:
+        """Return a parameter set or mapping: a file of the package, or in place."""
+        source = element.get("source")
+        kind = element.get("type", "application/x-ssp-parameter-")
+        if not kind.startswith("application/x-ssp-parameter-"):
+            raise SSPError(f"{where}: type '{kind}' is not supported, SSV and SSM are")
+        if element.get("sourceBase", "SSD") != "SSD":
+            raise SSPError(f"{where}: sourceBase '{element.get('sourceBase')}' is not supported, SSD is")
+        if source:
+            found = parse_xml(self.read(source, where), f"{self.where}/{source}")
+            if found.tag != tag(prefix, name):
+                raise SSPError(f"{where}: {source} is no {name}")
+            return found
+        outer = element if inside is None else element.find(f"{SSD}:{inside}", NAMESPACES)
+        return None if outer is None else outer.find(f"{prefix}:{name}", NAMESPACES)
+
+
+def _nodes(element: Element, name: str) -> Iterator[Node]:
+    """Yield what a name in a binding of an element means: variables below it, or a connector."""
+    if element.is_component:
+        yield Node(element.path, name)
+        return
+    if name in element.kinds:
+        yield Node(element.path, name)
+    for child in element.children.values():
+        start = f"{child.path[-1]}."
+        if name.startswith(start):
+            yield from _nodes(child, name.removeprefix(start))
+
+
+def _value(parameter: etree._Element, units: Units, where: str) -> Value:
+    """Read one parameter of a set; several values are those of an array, row by row."""
+    found = next((c for c in parameter if c.tag.startswith(f"{{{NAMESPACES[SSV]}}}")), None)
+    if found is None:
+        raise SSPError(f"{where} has no value")
+    kind = str(found.tag).rpartition("}")[2]
+    each = [str(v.get("value")) for v in found.iterfind(f"{SSV}:Value", NAMESPACES)]
+    text = str(found.get("value", ""))
+    values: list[Any]
+    if kind in _REALS:
+        values = list(numbers(text, where))
+    elif kind in _INTEGERS:
+        try:
+            values = [int(part) for part in text.split()]
+        except ValueError:
+            raise SSPError(f"{where}: '{text}' is no whole number") from None
+    elif kind == "Boolean":
+        values = [flag(part) for part in text.split()]
+    elif kind in ("String", "Enumeration", "Binary"):
+        values = each or [text]
+    else:
+        raise SSPError(f"{where}: type {kind} is not supported")
+    if kind == "Binary":
+        try:
+            values = [bytes.fromhex(v) for v in values]
+        except ValueError:
+            raise SSPError(f"{where}: '{text}' is no hexadecimal number") from None
+    sizes = [d.get("size", "") for d in parameter.iterfind(f"{SSC}:Dimension", NAMESPACES)]
+    if not all(size.isascii() and size.isdigit() and len(size) < 10 for size in sizes):
+        raise SSPError(f"{where}: dimensions {sizes} are no whole numbers")
+    shape = [int(size) for size in sizes]
+    if shape or len(values) != 1:
+        try:
+            plain = np.array(values, dtype=object).reshape(shape or [-1]).tolist()
+        except ValueError:
+            raise SSPError(f"{where} has {len(values)} values for dimensions {shape}") from None
+        return Value(kind, plain, found.get("unit"), units)
+    return Value(kind, values[0], found.get("unit"), units)
+
+
+def _mapped(value: Value, entry: etree._Element, where: str) -> Value:
+    """Apply the transformation of a mapping entry."""
+    for child in entry:
+        name = str(child.tag).rpartition("}")[2]
+        if name.endswith("MappingTransformation"):
+            raise SSPError(f"{where}: a {name} is not supported, a LinearTransformation is")
+    linear = entry.find(f"{SSC}:LinearTransformation", NAMESPACES)
+    keep = flag(entry.get("suppressUnitConversion"))
+    if linear is None:
+        return replace(value, keep_unit=keep)
+    factor, offset = factor_and_offset(linear, where)
+    if value.kind not in _REALS:
+        raise SSPError(f"{where}: a LinearTransformation of {value.kind} values is not defined")
+    return replace(value, factor=factor, offset=offset, keep_unit=keep)

@@ -1,0 +1,318 @@
+"""A system from an SSP (System Structure and Parameterization, 1.0 and 2.0).
+
+    system = read_ssp("loop.ssp")
+    system = read_ssp("loop.ssp", replace={"control": MyController()})
+
+Components are FMUs with the start values that the package binds to them; nested systems are
+flattened, `plant.damper` becomes the participant `plant_damper`; signal dictionaries,
+connectors of systems, units and linear transformations are resolved to plain connections.
+What is not supported is an error that names the element: mapping transformations, other
+packages as components, clocks. fmus/ssp.py writes SSPs, format.py says what an SSP of
+ours tells beyond the standard.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+
+from ..errors import CosimError, WiringError, did_you_mean
+from ..fmi.archive import Archive, Extraction
+from ..fmi.fmu import FMU
+from ..fmi.model_description import read_description
+from ..fmi.ports import unit_of
+from ..fmi.text_ports import text_port
+from ..participant import Block, Participant
+from ..system import Member, System, inputs_of, outputs_of
+from .format import (
+    FMU_TYPE,
+    NAMESPACES,
+    ROOT,
+    SSD,
+    VERSIONS,
+    SSPError,
+    Units,
+    element_name,
+    flag,
+    number,
+    own_annotation,
+    parse_xml,
+    tag,
+)
+from .parameters import Parameters, Value
+from .structure import Element, Link, Structure
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How a package says that it is run; None where it does not say, times in s."""
+
+    start: float | None = None
+    stop: float | None = None
+    step: float | None = None
+    coupling: str | None = None
+    solver: str | None = None
+
+
+@dataclass(frozen=True)
+class Package:
+    """What an SSP holds: the system, and its default experiment."""
+
+    system: System
+    experiment: Experiment
+
+
+def read_ssp(
+    path: str | PathLike[str], *, replace: Mapping[str, Member | type[Participant]] | None = None
+) -> System:
+    """Return the system of an SSP; `replace` puts participants in the place of components, by name.
+
+    A participant in the place of a component has ports with the names of its connectors; the
+    values that the package binds to that component are not for it. A class is made with its
+    own start values, and acts with the period that the component has.
+    """
+    return read_package(path, replace=replace).system
+
+
+def read_package(
+    path: str | PathLike[str], *, replace: Mapping[str, Member | type[Participant]] | None = None
+) -> Package:
+    """Return the system and the default experiment of an SSP."""
+    with Archive(Path(path), "SSP") as archive:
+        return _Reader(archive, dict(replace or {})).package()
+
+
+class _Reader:
+    """Reads one package."""
+
+    def __init__(self, archive: Archive, replace: dict[str, Member | type[Participant]]) -> None:
+        self.where = archive.path.name
+        self.archive = archive
+        self.replace = replace
+        #: what took the place of components
+        self.replaced: dict[str, Member] = {}
+        self.extraction: Extraction | None = None
+        self.root = parse_xml(self.read(ROOT, self.where), f"{self.where}/{ROOT}")
+        version = self.root.get("version", "none")
+        if self.root.tag != tag(SSD, "SystemStructureDescription") or version not in VERSIONS:
+            raise SSPError(f"{self.where} has SSP version {version}; 1.0 and 2.0 are supported")
+        self.structure = Structure(self.root, self.where)
+        self.units = Units.of(self.root, SSD, self.where)
+        self.parameters = Parameters(self.structure.root, self.read, self.where)
+
+    def read(self, source: str, where: str) -> bytes:
+        """Return an XML file of the package by the URI that names it."""
+        return self.archive.read(source if source == ROOT else self._name(source, where))
+
+    def _name(self, source: str, where: str) -> str:
+        """Return the name in the archive for a URI."""
+        uri = urlsplit(source)
+        name = posixpath.normpath(unquote(uri.path))
+        if uri.scheme or uri.netloc or uri.fragment or name.startswith(("/", "..")):
+            raise SSPError(f"{where}: '{source}' is outside of the package, which is not supported")
+        if name not in self.archive.names:
+            hint = did_you_mean(name, self.archive.names)
+            raise SSPError(f"{where}: the package has no file '{name}'{hint}")
+        return name
+
+    def package(self) -> Package:
+        """Build the system."""
+        system = System()
+        links = list(self.structure.links())
+        names: dict[str, Element] = {}
+        for path, element in self.structure.components.items():
+            name = element_name(path)
+            if name in names:
+                other = ".".join(names[name].path)
+                raise SSPError(
+                    f"{self.where}: {other} and {'.'.join(path)} would both be '{name}'; rename one"
+                )
+            names[name] = element
+        for name in self.replace:
+            if name not in names:
+                raise WiringError(f"{self.where} has no component '{name}'" + did_you_mean(name, names))
+        for name, element in names.items():
+            system.add(
+                name, self._other(name, element) if name in self.replace else self._fmu(element, links)
+            )
+        for link in links:
+            if link.origin.path in self.structure.components and not self._sets_parameter(link):
+                self._connect(system, link)
+        return Package(system, self._experiment())
+
+    def _sets_parameter(self, link: Link) -> bool:
+        kind = self.structure.components[link.target.path].kinds[link.target.name]
+        if kind in ("parameter", "structuralParameter"):
+            raise SSPError(
+                f"{self.where}: {link.origin} -> {link.target} connects a parameter to another component, "
+                "which is not supported; bind a value to it"
+            )
+        return False
+
+    # ---------------------------------------------------------------------- components
+
+    def _other(self, name: str, element: Element) -> Member:
+        """Return the participant that takes the place of a component."""
+        given = self.replace[name]
+        if isinstance(given, type):
+            where = f"{self.where}: {name} is replaced by a {given.__name__}"
+            options = self._options(element, where) if issubclass(given, Block) else {}
+            try:
+                given = given(**{n: options[n] for n in ("every", "sample_period") if n in options})
+            except CosimError as error:
+                raise type(error)(f"{where}: {error}") from error
+        self.replaced[name] = given
+        return given
+
+    def _fmu(self, element: Element, links: list[Link]) -> FMU:
+        where = f"{self.where}: component {'.'.join(element.path)}"
+        source = element.xml.get("source")
+        if not source:
+            raise SSPError(f"{where} has no FMU (no source); give a participant in its place, replace=")
+        kind = element.xml.get("type", FMU_TYPE)
+        if kind != FMU_TYPE:
+            raise SSPError(f"{where} is of type {kind}, which is not supported; FMUs ({FMU_TYPE}) are")
+        name = self._name(source, where)
+        if self.extraction is None:
+            self.extraction = self.archive.extraction()
+        path = self.extraction.folder / name
+        try:
+            start = self._start_values(element, read_description(path), links)
+            fmu = FMU(path, start=start, **self._options(element, where))
+        except CosimError as error:
+            raise type(error)(f"{where}: {error}") from error
+        fmu.kept = self.extraction
+        return fmu
+
+    def _options(self, element: Element, where: str) -> dict[str, Any]:
+        """Return the keywords of an FMU that the element and our annotation give."""
+        own = own_annotation(element.xml, SSD, "participant")
+        options: dict[str, Any] = {"as_block": own.get("kind") == "block"}
+        interface = element.xml.get("implementation", "any")
+        if interface != "any":
+            options["interface"] = interface
+        if "solver" in own:
+            options["solver"] = own["solver"]
+        options |= {
+            n: flag(own[a]) for n, a in (("event_mode", "eventMode"), ("isolated", "isolated")) if a in own
+        }
+        options |= {n: _whole(own[n], where) for n in ("substeps", "every") if n in own}
+        for name, attribute in (("tolerance", "tolerance"), ("sample_period", "samplePeriod")):
+            if attribute in own:
+                options[name] = number(own[attribute], where)
+        return options
+
+    def _start_values(self, element: Element, description: Any, links: list[Link]) -> dict[str, Any]:
+        self.units.add_fmu(description)
+        variables = {v.name: v for v in description.modelVariables}
+        found = self.parameters.of(element)
+        start = {n: self._start(value, variables[n]) for n, value in found.items() if n in variables}
+        for link in links:
+            if link.target.path == element.path and link.target.name in variables:
+                value = self.parameters.values.get(link.origin)
+                if value is not None and link.origin.path not in self.structure.components:
+                    start[link.target.text] = self._along(link, value, variables[link.target.name])
+        return start
+
+    def _start(self, value: Value, variable: Any) -> Any:
+        if value.kind != "Enumeration":
+            return value.in_unit(unit_of(variable), self.units)
+        items = {i.name: int(i.value) for i in getattr(variable.declaredType, "items", None) or []}
+        names = value.value if isinstance(value.value, list) else [value.value]
+        for name in names:
+            if name not in items:
+                raise SSPError(f"'{name}' is no item of {variable.name}" + did_you_mean(name, items))
+        return [items[n] for n in names] if isinstance(value.value, list) else items[value.value]
+
+    def _along(self, link: Link, value: Value, variable: Any) -> Any:
+        """Return the value of a system's connector as what arrives at a component's."""
+        first = self.structure.units.get(link.origin) or value.unit
+        scale, offset = self._transformation(link, first, unit_of(variable))
+        plain = value.in_unit(first, self.units)
+        return plain if (scale, offset) == (1.0, 0.0) else scale * plain + offset
+
+    # --------------------------------------------------------------------- connections
+
+    def _connect(self, system: System, link: Link) -> None:
+        origin, target = link.origin, link.target
+        a, b = (f"{element_name(node.path)}.{node.text}" for node in (origin, target))
+        text = " -> ".join(map(str, [origin, *(edge.target for edge in link.edges)]))
+        initial = link.edges[0].initial
+        late = None if initial is None else np.array(initial)
+        if len(link.edges) > 1 and any(edge.initial is not None for edge in link.edges):
+            raise SSPError(
+                f"{self.where}: {text} is one step late inside of a system, which is not supported"
+            )
+        try:
+            transformation = None
+            if text_port(system, a, "output") is None:
+                source, sink = system.port(a, "output"), system.port(b, "input")
+                relative = system.is_relative(source) or system.is_relative(sink)
+                transformation = self._transformation(link, source.unit, sink.unit, relative)
+            elif any((edge.factor, edge.offset) != (1.0, 0.0) for edge in link.edges):
+                transformation = (0.0, 0.0)  # which is refused for a text
+            system.connect(a, b, initial=late, transformation=transformation)
+        except WiringError as error:
+            ends = (element_name(node.path) for node in (origin, target))
+            for name in (n for n in ends if n in self.replaced):
+                member = self.replaced[name]
+                ports = ", ".join([*inputs_of(member), *outputs_of(member)])
+                text += f" ({name} is replaced by a {type(member).__name__}, ports: {ports})"
+            raise WiringError(f"{self.where}: {text}: {error}") from error
+
+    def _transformation(
+        self, link: Link, first: str | None, last: str | None, relative: bool = False
+    ) -> tuple[float, float]:
+        """Return (factor, offset) from a port's unit over all connectors to another port's unit.
+
+        Relative quantities are differences: their units are converted without offset.
+        """
+        scale, offset, unit = 1.0, 0.0, first
+
+        def apply(factor: float, shift: float) -> None:
+            nonlocal scale, offset
+            if (factor, shift) != (1.0, 0.0):
+                scale, offset = factor * scale, factor * offset + shift
+
+        def to(other: str | None) -> None:
+            nonlocal unit
+            factor, shift = self.units.convert(unit, other)
+            apply(factor, 0.0 if relative else shift)
+            unit = other or unit
+
+        to(self.structure.units.get(link.origin.whole))
+        for edge in link.edges:
+            other = self.structure.units.get(edge.target.whole)
+            if edge is link.edges[-1]:
+                other = other or last  # a linear transformation comes after the conversion
+            if edge.keep_unit:
+                unit = other
+            else:
+                to(other)
+            apply(edge.factor, edge.offset)
+        to(last)
+        return scale, offset
+
+    def _experiment(self) -> Experiment:
+        found = self.root.find(f"{SSD}:DefaultExperiment", NAMESPACES)
+        if found is None:
+            return Experiment()
+        own = own_annotation(found, SSD, "experiment")
+        where = f"{self.where}: default experiment"
+        texts = {"start": found.get("startTime"), "stop": found.get("stopTime"), "step": own.get("step")}
+        times = {name: number(text, where) for name, text in texts.items() if text}
+        return Experiment(**times, coupling=own.get("coupling"), solver=own.get("solver"))
+
+
+def _whole(text: str, where: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise SSPError(f"{where}: '{text}' is no whole number") from None

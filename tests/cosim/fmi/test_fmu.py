@@ -1,0 +1,183 @@
+"""An FMU in the loop: the same plant in Python and as FMU, and FMUs that cannot be used."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import FMU, Input, LinearContinuous, Output, Parameter, State, System, simulate
+from cosim.errors import FMUError, SimulationError, WiringError
+from fmus.description import DefaultExperiment
+from fmus.export import export
+
+from ..parts import Gain
+from ..test_faults import Diverges
+
+
+class Chain(LinearContinuous):
+    """Two masses, two forces, accelerations as feedthrough outputs, not symmetric."""
+
+    k = Parameter(3.0)
+    u = Input(shape=2)
+    x = State([0.5, -0.2], shape=2)
+    v = State([0.1, 0.7], shape=2)
+    a = Output(shape=2)
+
+    def derivatives(self, t):
+        self.der_x[0] = self.v[0]
+        self.der_x[1] = self.v[1]
+        self.der_v[0] = self.u[0] - self.k * self.x[0] + 0.4 * self.x[1] - 0.1 * self.v[0]
+        self.der_v[1] = 0.5 * self.u[1] + 0.3 * self.x[0] - 2.0 * self.x[1]
+
+    def outputs(self, t):
+        self.a[0] = self.der_v[0]
+        self.a[1] = self.der_v[1]
+
+
+@pytest.fixture(scope="module")
+def fmu_path(tmp_path_factory):
+    return export(Chain(), tmp_path_factory.mktemp("fmu") / "chain.fmu")
+
+
+def closed(plant) -> System:
+    """The second mass is watched, the first one pushed."""
+    return System({"plant": plant, "g": Gain(K=-0.8)}, [("plant.x[2]", "g.x"), ("g.u", "plant.u[1]")])
+
+
+@pytest.mark.parametrize("options", [{}, {"coupling": "continuous", "solver": "ode4"}])
+def test_python_and_fmu_give_the_same_trajectory(fmu_path, options):
+    """CS by the same code; ME by the same Runge-Kutta: a few roundings of 1e-16 a step, 300 steps."""
+    record = ["plant.a", "g.u"]
+    runs = [
+        simulate(closed(plant), step=0.01, stop=3.0, record=record, **options)
+        for plant in (Chain(), FMU(fmu_path))
+    ]
+    for name in record:
+        assert runs[1][name] == pytest.approx(runs[0][name], abs=1e-12)
+    assert np.ptp(runs[0]["plant.a"], axis=0).min() > 0.5
+
+
+def test_model_exchange_alone_is_integrated_in_substeps(tmp_path):
+    path = export(Chain(), tmp_path / "me.fmu", interfaces=["ModelExchange"])
+    result = simulate(closed(FMU(path, substeps=2)), step=0.02, stop=2.0, record=["plant.a"])
+    exact = simulate(closed(Chain()), step=0.02, stop=2.0, record=["plant.a"])
+    # ode4 with h = 0.01: (2 h)^5 / 120 of error a step at most, over 200 steps; Euler would give 1e-2
+    assert result["plant.a"] == pytest.approx(exact["plant.a"], abs=1e-8)
+
+
+def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
+    """u[2] is not connected: it has the value that it was given, at every step."""
+    plant = Chain(k=5.0, u=[0.0, 1.5])
+    fmu = FMU(fmu_path, start={"k": 5.0, "u": [0.0, 1.5]})
+    runs = [simulate(closed(p), step=0.01, stop=1.0, record=["plant.a"]) for p in (plant, fmu)]
+    assert runs[1]["plant.a"][1:] == pytest.approx(runs[0]["plant.a"][1:], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        ({"kk": 1.0}, "no variable 'kk'; did you mean 'k'"),
+        ({"k": "stiff"}, "start value k = 'stiff' is no number with a unit"),
+        ({"k": np.nan}, "is no Real"),
+        ({"u": [1.0, 2.0, 3.0]}, r"is no Real of shape \(2,\)"),
+    ],
+)
+def test_wrong_start_values_are_refused(fmu_path, start, words):
+    with pytest.raises(FMUError, match=words):
+        FMU(fmu_path, start=start)
+
+
+def copy_without(source, target, keep=lambda name: True, change=lambda name, data: data):
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            if keep(name):
+                new.writestr(name, change(name, old.read(name)))
+    return target
+
+
+def test_files_that_are_no_usable_fmu(fmu_path, tmp_path):
+    before = Path.cwd()
+    with pytest.raises(FMUError, match="there is no file"):
+        FMU(tmp_path / "missing.fmu")
+    (tmp_path / "text.fmu").write_text("no zip")
+    with pytest.raises(FMUError, match="not a ZIP archive"):
+        FMU(tmp_path / "text.fmu")
+    bare = copy_without(fmu_path, tmp_path / "bare.fmu", keep=lambda n: n != "modelDescription.xml")
+    with pytest.raises(FMUError, match=r"no modelDescription\.xml"):
+        FMU(bare)
+    old = copy_without(
+        fmu_path,
+        tmp_path / "old.fmu",
+        change=lambda n, d: d.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"'),
+    )
+    with pytest.raises(FMUError, match=r"FMI version 1\.0"):
+        FMU(old)
+    other = copy_without(fmu_path, tmp_path / "other.fmu", keep=lambda n: not n.startswith("binaries/"))
+    with pytest.raises(FMUError, match=r"has no binary for .*it has: none"):
+        FMU(other)
+    broken = copy_without(
+        fmu_path, tmp_path / "broken.fmu", change=lambda n, d: b"" if n.startswith("binaries/") else d
+    )
+    with pytest.raises(FMUError, match="cannot be loaded"):
+        simulate(closed(FMU(broken)), step=0.1, stop=1.0)
+    assert Path.cwd() == before  # FMPy would leave us in the folder of the library
+
+
+def test_stage_coupling_needs_model_exchange(tmp_path):
+    path = export(Chain(), tmp_path / "cs.fmu", interfaces=["CoSimulation"])
+    with pytest.raises(WiringError, match=r"plant \(cs\.fmu\) has no Model Exchange"):
+        simulate(closed(FMU(path)), step=0.1, stop=1.0, coupling="continuous")
+
+
+def test_many_runs_in_one_process_leave_nothing_behind(fmu_path):
+    """300 runs: no more open files, and less memory than an instance each would take (some 100 kB)."""
+    system = closed(FMU(fmu_path))
+
+    def used() -> tuple[int, int]:
+        pages = int(open("/proc/self/statm").read().split()[1])  # noqa: SIM115
+        return len(os.listdir("/proc/self/fd")), pages * os.sysconf("SC_PAGE_SIZE")
+
+    for _ in range(50):
+        simulate(system, step=0.1, stop=1.0)
+    files, memory = used()
+    for _ in range(300):
+        simulate(system, step=0.1, stop=1.0)
+    more_files, more_memory = used()
+    assert more_files == files
+    assert more_memory - memory < 10_000_000
+
+
+def test_what_an_fmu_logs_is_part_of_the_error(tmp_path):
+    path = tmp_path / "diverges.fmu"
+    export(Diverges(), path, interfaces=["ModelExchange"], experiment=DefaultExperiment(stop=0.1, step=0.01))
+    with pytest.raises(SimulationError, match=r"(?s)plant failed at t = .*fmi2Error.*der\(x\) became inf"):
+        simulate(System({"plant": FMU(path)}), step=0.1, stop=9.0, coupling="continuous", solver="ode1")
+
+
+def test_lines_of_the_log_go_to_the_fmu_that_they_come_from(capsys):
+    """FMPy's native proxy has room for one logger; with one for each FMU the last one got everything."""
+    import gc
+
+    from cosim.fmi.fmi2_log import callbacks
+
+    class Instance:
+        def __init__(self):
+            self.lines = []
+
+        def note(self, status, message):
+            self.lines.append((status, message))
+
+    a, b = Instance(), Instance()
+    of_a, of_b = callbacks(a), callbacks(b)
+    of_a.logger(of_a.componentEnvironment, b"a", 1, b"", b"of a")
+    of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"of b")
+    assert (a.lines, b.lines) == ([(1, b"of a")], [(3, b"of b")])
+    del b
+    gc.collect()
+    of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"too late")  # an FMU that speaks when it is gone
+    of_a.logger(None, b"another", 1, b"", b"of FMPy")
+    assert capsys.readouterr().out == "[WARNING] of FMPy\n"

@@ -1,0 +1,45 @@
+"""Loading FMUs: by many threads at once, and those that need a tool that is not there."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from cosim import FMU, System, simulate
+from cosim.errors import FMUError
+from cosim.fmi.inspection import inspection
+
+from .metronome import metronome
+from .probe import probe
+
+
+def test_threads_load_one_at_a_time(tmp_path, monkeypatch):
+    """FMPy changes the folder of the process while it loads: two at once would leave it elsewhere."""
+    paths = [probe(tmp_path / f"{i}.fmu", version) for i, version in enumerate(["2.0", "3.0"] * 4)]
+    load = ctypes.cdll.LoadLibrary
+
+    def slowly(path):
+        time.sleep(0.02)
+        return load(path)
+
+    monkeypatch.setattr(ctypes.cdll, "LoadLibrary", slowly)
+    before = os.getcwd()
+
+    def run(path):
+        return list(simulate(System({"p": FMU(path)}), step=0.25, stop=1.0)["p.x"])
+
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(run, paths)) == [[0.0, 0.25, 0.5, 0.75, 0.0]] * 8
+    assert os.getcwd() == before
+
+
+def test_an_fmu_that_needs_its_tool_says_so(tmp_path):
+    path = metronome(tmp_path / "m.fmu", tool="Wonderlab 7")
+    assert "needs its tool" in inspection(path)
+    words = r"m \(m\.fmu\) failed to instantiate: .*\nm\.fmu needs its tool \(Wonderlab 7\) to run"
+    with pytest.raises(FMUError, match=words):
+        simulate(System({"m": FMU(path)}), step=0.25, stop=1.0)
