@@ -9,104 +9,18 @@ in the loop; FMUInstance (fmi/instance.py, fmi/model_exchange.py) for FMUs.
 from __future__ import annotations
 
 import ctypes
-import signal
-import threading
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from .compiler import kernel_addresses
 from .errors import CompilationError, DeclarationError, SimulationError
+from .failures import KERNEL, Failures
 from .opcodes import CALL, COPY, Op
 from .participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from .variables import Array
-
-_KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
-
-
-class EndOfRun(Exception):
-    """A participant asks, inside a step, to end the run: a normal end, but the step is not completed."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.text = text
-
-
-class Failures:
-    """Where callbacks leave an exception or a request to end for the master; a C loop cannot carry it."""
-
-    def __init__(self) -> None:
-        self.exception: BaseException | None = None
-        self.participant = ""
-        self.time = 0.0
-        #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
-        self.interrupted = False
-        #: who asked to end the run, and when; "" while nobody does
-        self.end = ""
-        #: (1,) 1 when the loop is to end at the next point
-        self.stop = np.zeros(1, dtype=np.int64)
-
-    def clear(self) -> None:
-        """Forget what happened: the simulation goes on from where it stands, or from a snapshot."""
-        self.exception, self.interrupted = None, False
-        self.set_end("")
-
-    def set_end(self, text: str) -> None:
-        """Let the run end at the next point, or go on if the text is empty."""
-        self.end, self.stop[0] = text, bool(text)
-
-    def ask_to_end(self, name: str, t: float, at_end: bool) -> None:
-        """Note that a participant asks at t to end the run.
-
-        At the end of a step the run goes on to the communication point that is reached;
-        inside it, EndOfRun leaves the step.
-        """
-        text = f"{name} asked to end the simulation at t = {t:.10g} s"
-        if not at_end:
-            raise EndOfRun(text)
-        self.set_end(self.end or text)
-
-    def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
-        """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""
-
-        def guarded(_: int, t: float, h: float) -> int:
-            try:
-                function(t, h)
-                if self.interrupted:
-                    raise KeyboardInterrupt
-            except BaseException as exception:
-                self.exception, self.participant, self.time = exception, name, t
-                return 1
-            return 0
-
-        return _KERNEL(guarded)
-
-
-@contextmanager
-def ctrl_c(failures: Failures) -> Iterator[None]:
-    """Note Ctrl-C, to be acted upon between chunks or after a callback.
-
-    Raised at any moment it may strike while Python enters a callback from C, where the
-    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
-    """
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield
-        return
-
-    def note(number: int, frame: object) -> None:
-        if failures.interrupted:
-            raise KeyboardInterrupt
-        failures.interrupted = True
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class CompiledKernelsWarning(UserWarning):
@@ -156,7 +70,7 @@ class KernelInstance:
     def start(self, t0: float) -> None:
         """Run `initialize`, interpreted or compiled like everything else."""
         if "initialize" in self._addresses:
-            function = _KERNEL(self._addresses["initialize"])
+            function = KERNEL(self._addresses["initialize"])
             if function(self.base, t0, 0.0) != 0 and self.failures.exception is None:
                 again = self.failures.guard(self.name, self._interpreted("initialize"))  # for its exception
                 if again(self.base, t0, 0.0) == 0:
@@ -167,7 +81,7 @@ class KernelInstance:
     def _check_linear(self, t0: float) -> None:
         """Refuse derivatives whose response to states and inputs is no sum, or depends on t."""
         p, saved = self.participant, self.participant.memory.copy()
-        derivatives = _KERNEL(self._addresses["derivatives"])
+        derivatives = KERNEL(self._addresses["derivatives"])
         random = np.random.default_rng(1)
         x, u = (random.uniform(-1.0, 1.0, (2, v.size)) for v in (p.state_vector, p.input_vector))
 
@@ -280,6 +194,10 @@ class KernelInstance:
             if v.slot <= slot < v.slot + v.size:
                 return name if not v.shape else f"{name}[{slot - v.slot + 1}]"
         return "?"
+
+    def failed(self, status: int, t: float) -> str:
+        """Return what it means that a kernel failed."""
+        return f"{self.name} failed with an exception in its kernel (jit=False shows where) at t = {t:g} s"
 
     def log(self) -> list[str]:
         """Kernels do not log."""

@@ -14,53 +14,64 @@ the coupling is of second order. What blocks give is held over the step, as alwa
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 import numpy as np
 
 from .errors import SimulationError, WiringError
-from .instances import EndOfRun
+from .failures import Failures
+from .fmi.co_simulation import CoSimulationInstance
+from .fmi.model_exchange import ModelExchangeInstance
+from .instances import KernelInstance
 from .loop import Loop
 from .opcodes import CALL, Op
 from .quasi_newton import NoConvergence, QuasiNewton
-from .system import Connection
+from .system import Connection, Port
 from .variables import Array
 
-if TYPE_CHECKING:
-    from .program import Program
+Coupled: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInstance
 
 
 class IteratedCoupling:
     """The participants that drive each other, and the solver of what they exchange."""
 
-    def __init__(self, program: Program, connections: list[Connection], tolerance: float) -> None:
-        self._program = program
-        ends = [end.participant for c in connections for end in (c.source, c.target)]
+    def __init__(
+        self,
+        members: Mapping[str, Coupled],
+        connections: list[Connection],
+        tolerance: float,
+        address: Callable[[Port], int],
+        run_once: Callable[[Loop, float, int], None],
+        failures: Failures,
+    ) -> None:
+        """Take the members by name, the connections between them, and the program's services.
+
+        address
+            returns where the floats of a port lie
+        run_once
+            runs the operations of a loop at t_0 + k h; raises what ends the run
+        """
+        self._instances = members
         #: the participants, in the order of the system
-        self.members = [name for name in program.instances if name in ends]
-        self._instances = {name: program.instances[name] for name in self.members}
+        self.members = list(members)
+        self._run_once = run_once
+        self._failures = failures
         unable = [name for name, instance in self._instances.items() if not instance.can_save]
         if unable:
             raise WiringError(
                 f"{', '.join(unable)} cannot get and set its state (canGetAndSetFMUState), which iterated "
                 'coupling needs to repeat a step; use coupling="sampled", or export it with that capability'
             )
-        ticking = [n for n in self.members if getattr(program.system.participants[n], "clocks", None)]
-        if ticking:
-            raise WiringError(
-                f"{', '.join(ticking)} cannot be iterated: clocks would tick at every repetition of a step; "
-                'use coupling="sampled"'
-            )
         self._sources = list(dict.fromkeys(c.source for c in connections))
-        self._views = [_floats(program.address(p), p.count) for p in self._sources]
+        self._views = [_floats(address(p), p.count) for p in self._sources]
         n = 0
         where = {}
         for port in self._sources:
             where[port] = slice(n, n + port.count)
             n += port.count
         self._inputs = [
-            (_floats(program.address(c.target), c.target.count), where[c.source], c.scale, c.offset)
+            (_floats(address(c.target), c.target.count), where[c.source], c.scale, c.offset)
             for c in connections
         ]
         self._solver = QuasiNewton(n, tolerance)
@@ -68,7 +79,7 @@ class IteratedCoupling:
         self._w, self._before = np.full((2, n), np.nan)
         self._t0 = 0.0
         self._loops: tuple[Loop, Loop] | None = None
-        self._callback = program.failures.guard(self.members[0], self._step)
+        self._callback = failures.guard(self.members[0], self._step)
 
     def operation(self) -> Op:
         """Return the operation that moves the members from t_k to t_{k+1}."""
@@ -93,7 +104,7 @@ class IteratedCoupling:
         self._t0 = t0
         every = list(self._instances.values())
         latch = [op for i in every for op in i.latch()]
-        stop = self._program.failures.stop
+        stop = self._failures.stop
         look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [], stop)
         after = [op for i in every for op in i.read(1.0)]
         move = Loop([*latch, *(op for i in every for op in i.advance())], [], stop)
@@ -101,10 +112,10 @@ class IteratedCoupling:
 
         def g(w: Array) -> Array:
             self._hold(w)
-            self._run(look, 0)
+            self._run_once(look, t0, 0)
             return self._outputs()
 
-        self._run(look, 0)
+        self._run_once(look, t0, 0)
         solver = QuasiNewton(len(self._w), self._solver.tolerance)
         self._w[:] = self._before[:] = self._solved(solver, g, self._outputs(), t0)
 
@@ -114,19 +125,19 @@ class IteratedCoupling:
         move, look = self._loops
         k = round((t - self._t0) / h)
         saved = {name: instance.save(serialised=False) for name, instance in self._instances.items()}
-        moved, asked = False, self._program.failures.end
+        moved, asked = False, self._failures.end
 
         def g(w: Array) -> Array:
             nonlocal moved
             if moved:
                 for name, instance in self._instances.items():
                     instance.restore(saved[name])
-                self._program.failures.set_end(asked)
+                self._failures.set_end(asked)
             moved = True
             self._hold(0.5 * (self._w + w))
-            self._run(move, k)
+            self._run_once(move, self._t0, k)
             self._hold(w)
-            self._run(look, k)
+            self._run_once(look, self._t0, k)
             return self._outputs()
 
         w = self._solved(self._solver, g, 2.0 * self._w - self._before, t + h)
@@ -152,15 +163,6 @@ class IteratedCoupling:
 
     def _outputs(self) -> Array:
         return np.concatenate(self._views)
-
-    def _run(self, loop: Loop, k: int) -> None:
-        """Run operations once, at t_k."""
-        program = self._program
-        if loop.run(k, k + 1, k, self._t0, program.h):
-            if isinstance(program.failures.exception, EndOfRun):
-                raise program.failures.exception
-            row, _, status = (int(x) for x in loop.report[:3])
-            raise program.error(loop.rows[row], self._t0, k, status)
 
 
 def _floats(address: int, n: int) -> Array:

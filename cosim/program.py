@@ -15,36 +15,33 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterable
 from dataclasses import replace
-from graphlib import CycleError, TopologicalSorter
 from itertools import groupby
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from .errors import SimulationError, WiringError
+from .evaluation_order import evaluation_order
+from .failures import EndOfRun, Failures, operation_error
 from .fmi.co_simulation import CoSimulationInstance
 from .fmi.fmu import FMU
 from .fmi.instance import FMUInstance
 from .fmi.model_exchange import ModelExchangeInstance
 from .fmi.text_ports import TextPort
-from .instances import Failures, KernelInstance, buffer
+from .instances import KernelInstance, buffer
 from .iterated import IteratedCoupling
 from .loop import Loop
 from .opcodes import (
     CALL,
     COMBINE,
     COPY,
-    FMI2_VALUES,
-    FMI3_VALUES,
-    FROM_FLOAT,
     GATHER,
     RECORD,
     STATISTICS,
-    TO_FLOAT,
     Op,
 )
 from .participant import Block, Continuous
-from .system import Connection, Port, System, cycle_text, is_block
+from .system import Connection, Port, System, is_block
 from .tableaus import TABLEAUS
 from .time_grid import steps_between
 from .variables import Array
@@ -306,7 +303,7 @@ class Program:
         coupled: list[Connection] = []
         if tolerance is not None:
             coupled = self._coupled(moving)
-            self.iteration = IteratedCoupling(self, coupled, tolerance)
+            self.iteration = self._iterated(coupled, tolerance)
         alone = [n for n in moving if self.iteration is None or n not in self.iteration.members]
         for name in moving:
             if self.instances[name].has_outputs:
@@ -323,6 +320,18 @@ class Program:
             self.second += self.instances[name].advance()
         self.second += [self.iteration.operation()] if self.iteration else []
         self.second += self._release(delays)
+
+    def _iterated(self, coupled: list[Connection], tolerance: float) -> IteratedCoupling:
+        """Return the coupling of the participants that are connected by `coupled`."""
+        ends = {end.participant for c in coupled for end in (c.source, c.target)}
+        members = {name: instance for name, instance in self.instances.items() if name in ends}
+        ticking = [n for n in members if getattr(self.system.participants[n], "clocks", None)]
+        if ticking:
+            raise WiringError(
+                f"{', '.join(ticking)} cannot be iterated: clocks would tick at every repetition of a step; "
+                'use coupling="sampled"'
+            )
+        return IteratedCoupling(members, coupled, tolerance, self.address, self.run_once, self.failures)
 
     def _coupled(self, moving: list[str]) -> list[Connection]:
         """Return the connections that iterated coupling solves for."""
@@ -345,7 +354,9 @@ class Program:
         moving = {n: i for n, i in self.instances.items() if not self._is_block(n)}
         integrated = {n: i for n, i in moving.items() if isinstance(i, Integrated)}
         assert moving == integrated  # _instance sees to it
-        rounds = self._rounds(list(moving))
+        through = {name: instance.feedthrough() for name, instance in moving.items()}
+        used = [*self.recorded, *self.watched]
+        rounds = evaluation_order(self.order, through, self.system.connections, used)
         work = {n: buffer((1 + len(nodes)) * i.n_states) for n, i in integrated.items()}
         self.buffers += work.values()
         for stage, (c, row) in enumerate(zip(nodes, rows, strict=True)):
@@ -391,40 +402,6 @@ class Program:
                     ops += self._block(name, delays, c, self.rates[name] or 1)
         return ops
 
-    def _rounds(self, moving: list[str]) -> list[dict[str, bool]]:
-        """Order blocks and outputs by dependence, in rounds of what does not depend on each other.
-
-        An output that depends on inputs follows their sources; the others come first. So a
-        participant may be read in several rounds: its accelerations after the forces that
-        follow from its displacements. The value tells whether it is read after its inputs.
-        """
-        through = {n: self.instances[n].feedthrough() for n in moving}
-        used = [*self.recorded, *self.watched, *(c.source for c in self.system.connections)]
-        graph: dict[tuple[str, str], list[tuple[str, str]]] = {(name, ""): [] for name in self.order}
-        graph |= {(p.participant, p.name): [] for p in used if p.name in through.get(p.participant, {})}
-        for c in self.system.connections:
-            if c.initial is None:
-                a, b = c.source.participant, c.target.participant
-                source = (a, c.source.name if a in moving else "")
-                for name, port in graph:
-                    if name == b and (b not in moving or c.target.name in through[b][port]):
-                        graph[name, port].append(source)
-        sorter = TopologicalSorter(graph)
-        try:
-            sorter.prepare()
-        except CycleError as error:
-            path = [name for name, _ in error.args[1]]
-            raise WiringError(cycle_text(path, self.system.connections)) from None
-        rounds: list[dict[str, bool]] = []
-        while sorter.is_active():
-            ready = sorter.get_ready()
-            sorter.done(*ready)
-            rounds.append({})
-            for name, port in ready:
-                after_inputs = name in moving and bool(through[name][port])
-                rounds[-1][name] = after_inputs or rounds[-1].get(name, False)
-        return rounds
-
     # ------------------------------------------------------------------------- the loop
 
     def start(self, t0: float) -> None:
@@ -432,7 +409,7 @@ class Program:
         for instance in self.instances.values():
             instance.start(t0)
             if self.failures.exception is not None:
-                raise self._exception()
+                raise self.failures.error()
         if self.iteration is not None:
             self.iteration.start(t0)
 
@@ -453,43 +430,20 @@ class Program:
             merged.append(Op("", GATHER, a=int(table.ctypes.data), n=len(pairs), every=plain))
         return merged
 
-    # ------------------------------------------------------------------------- failures
+    def run_once(self, loop: Loop, t0: float, k: int) -> None:
+        """Run operations of a loop of their own once, at t_k = t0 + k h; raise what ends the run."""
+        if loop.run(k, k + 1, k, t0, self.h):
+            if isinstance(self.failures.exception, EndOfRun):
+                raise self.failures.exception
+            row, _, status = (int(x) for x in loop.report[:3])
+            raise self.error(loop.rows[row], t0, k, status)
 
     def error(self, op: Op, start: float, k: int, status: int) -> SimulationError:
         """Return what it means that an operation failed at point k with a status."""
         if self.failures.exception is not None:
-            return self._exception()
+            return self.failures.error()
         t = op.seconds(start, k, self.h)
-        instance = self.instances[op.participant]
-        values = {FMI2_VALUES: op.c, FMI3_VALUES: op.c, FROM_FLOAT: op.a, TO_FLOAT: op.b}
-        checked = {CALL: op.b, COMBINE: op.c, **values}
-        if status < 0 and op.code in checked:
-            variable = instance.locate(checked[op.code] + 8 * (-status - 1))
-            what = "is not finite (NaN or infinite)"
-            remedy = "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
-            if op.code == FROM_FLOAT:
-                what, remedy = f"is not {op.number.values}", "round or limit its source in a block"
-            elif op.code == TO_FLOAT and not op.number.is_float:
-                what, remedy = "is above 2^53, which a float does not hold", "do not connect or record it"
-            text = f"{op.participant}.{variable} {what} at t = {t:g} s (step {k}); {remedy}"
-        elif isinstance(instance, FMUInstance):
-            text = instance.fmi.failure(status, t) + f" (step {k})"
-        else:
-            why = "an exception in its kernel; run with jit=False to see where"
-            text = f"{op.participant} failed at t = {t:g} s (step {k}) with {why}"
-        log = instance.log()[-8:]
-        if log:
-            text += "\n  log of the FMU:" + "".join(f"\n  {line}" for line in log)
-        return SimulationError(text)
-
-    def _exception(self) -> SimulationError:
-        """Return the exception of a callback as an error of the run."""
-        exception, where, t = self.failures.exception, self.failures.participant, self.failures.time
-        what = f"{type(exception).__name__}: {exception}"
-        asked = isinstance(exception, SimulationError)  # an FMU's: place and time are in it
-        error = SimulationError(str(exception) if asked else f"{where} failed at t = {t:g} s: {what}")
-        error.__cause__ = exception
-        return error
+        return operation_error(op, self.instances[op.participant], t, k, status)
 
     # ------------------------------------------------------------------------- as text
 

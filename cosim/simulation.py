@@ -36,9 +36,9 @@ from .errors import (
     WiringError,
     did_you_mean,
 )
+from .failures import EndOfRun, ctrl_c
 from .fmi.fmu import FMU
 from .fmi.text_ports import TextPort, text_port
-from .instances import EndOfRun, ctrl_c
 from .loop import Loop
 from .program import Program
 from .result import Result, Statistics

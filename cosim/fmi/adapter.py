@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..errors import FMUError, SimulationError
-from ..instances import Failures, ctrl_c
+from ..failures import Failures, ctrl_c
 from ..opcodes import Number
 from ..variables import Array
 from .isolation import Isolation, support_library

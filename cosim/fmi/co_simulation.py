@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import FMUError, SimulationError
-from ..instances import Failures
+from ..failures import Failures
 from ..opcodes import SLACK, Op
 from .adapter import StepAnswer
 from .clocks import Timers

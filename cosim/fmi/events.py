@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FMUError, SimulationError
-from ..instances import Failures
+from ..failures import Failures
 from ..opcodes import CALL, COPY, Op
 from .fmu import FMU
 from .instance import Exchange, FMUInstance

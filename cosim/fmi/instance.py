@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import CosimError, FMUError, SnapshotError
-from ..instances import Failures, buffer, ctrl_c
+from ..failures import Failures, ctrl_c
+from ..instances import buffer
 from ..opcodes import CALL, FROM_FLOAT, TO_FLOAT, Number, Op
 from .fmu import FMU
 from .ports import FMUPort
@@ -290,6 +291,10 @@ class FMUInstance:
             if 0 <= index < len(x.elements):
                 return x.elements[index]
         return "?"
+
+    def failed(self, status: int, t: float) -> str:
+        """Return what a status that a function of the FMU returned means."""
+        return self.fmi.failure(status, t)
 
     def log(self) -> list[str]:
         """Return what the FMU logged at warning level and above."""

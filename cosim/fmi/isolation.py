@@ -29,7 +29,7 @@ from typing import Any
 from ..c_compiler import LIBRARY_FLAGS, PLATFORMS, cached_library, complaint, fmi_headers, host, zig_cc
 from ..compiler import cache_directory
 from ..errors import CompilationError, FMUError
-from ..instances import Failures
+from ..failures import Failures
 
 _SOURCES = Path(__file__).parent / "c"
 _HOST = Path(__file__).parent / "isolated_host.py"

@@ -19,7 +19,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import CosimError
-from ..instances import Failures, buffer
+from ..failures import Failures
+from ..instances import buffer
 from ..opcodes import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
 from ..tableaus import TABLEAUS
 from .continuous_time import ContinuousTime

@@ -18,9 +18,9 @@ import cosim
 from cosim import FMU, Block, Output, Simulation, System, simulate
 from cosim.c_compiler import LIBRARY_FLAGS, PLATFORMS, fmi_headers, host, zig_cc
 from cosim.errors import FMUError, SimulationError
+from cosim.failures import Failures
 from cosim.fmi.fmi2 import Fmi2
 from cosim.fmi.fmi3 import Fmi3
-from cosim.instances import Failures
 from fmus.export import export
 
 from .ball import ball
