@@ -32,14 +32,14 @@ class QuasiNewton:
     """Solves w = g(w) for n values, again and again for a g that changes little.
 
     tolerance
-        |g(w) - w| of every value over the largest magnitude that it has had so far
+        |g(w) - w| of every value over the largest magnitude that it has or had as a solution
     """
 
     def __init__(self, n: int, tolerance: float) -> None:
         self.tolerance = tolerance
         #: dr/dw; not a number where it is not known yet
         self.jacobian: Array = np.full((n, n), np.nan)
-        #: the largest magnitude of every value so far
+        #: the largest magnitude of every value in the solutions so far
         self.scale: Array = np.zeros(n)
         #: evaluations so far: what solving costs
         self.evaluations = np.zeros(1)
@@ -54,26 +54,29 @@ class QuasiNewton:
         r = self._residual(g, w)
         built = False
         for count in range(_LIMIT):
-            error = np.abs(r) / np.where(self.scale > 0.0, self.scale, 1.0)
+            scale = np.maximum(self.scale, np.abs(w + r))
+            error = np.abs(r) / np.where(scale > 0.0, scale, 1.0)
             if (error <= self.tolerance).all():
-                return w
+                break
             if np.isnan(self.jacobian).any() or (count == _REBUILD and not built):
-                self._build(g, w, r)
+                self._build(g, w, r, scale)
                 built = True
             dw = self._direction(r)
             w = w + dw
             r_new = self._residual(g, w)
             if (np.abs(dw) <= 4e-16 * np.abs(w)).all():  # as near as numbers come
-                return w
+                break
             # r + J dw = 0 as far as J is right
             self.jacobian += np.outer(r_new, dw) / (dw @ dw)
             r = r_new
-        raise NoConvergence(error)
+        else:
+            raise NoConvergence(error)
+        np.maximum(self.scale, np.abs(w), out=self.scale)
+        return w
 
     def _residual(self, g: Callable[[Array], Array], w: Array) -> Array:
         value = g(w)
         self.evaluations += 1
-        np.maximum(self.scale, np.abs(value), out=self.scale)
         return value - w
 
     def _direction(self, r: Array) -> Array:
@@ -82,9 +85,9 @@ class QuasiNewton:
         except np.linalg.LinAlgError:
             return np.asarray(np.linalg.lstsq(self.jacobian, -r, rcond=None)[0])
 
-    def _build(self, g: Callable[[Array], Array], w: Array, r: Array) -> None:
+    def _build(self, g: Callable[[Array], Array], w: Array, r: Array, scale: Array) -> None:
         for j in range(len(w)):
             moved = w.copy()
-            moved[j] += _DIFFERENCE * (self.scale[j] or 1.0)
+            moved[j] += _DIFFERENCE * (scale[j] or 1.0)
             self.jacobian[:, j] = (g(moved) - moved - r) / (moved[j] - w[j])
             self.evaluations += 1
