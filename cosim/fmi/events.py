@@ -56,7 +56,6 @@ class EventInstance(FMUInstance):
         """Set the inputs; in event mode those that can change at events only."""
         waiting = [x for x in self.inputs if self.event_mode and x.discrete]
         native = [op for x in self.inputs if x not in waiting for op in self._set_inputs(x)]
-        waiting = [x for x in waiting if self.used & x.addresses.keys()]
         forget = [self._scaled(x.told, x.told, 0.0) for x in self.outputs if x.is_clock]
         if not self.event_mode:
             return [*native, *self._latch_texts()]
@@ -152,7 +151,7 @@ class EventInstance(FMUInstance):
                 if x.is_clock and ticked:
                     x.told[np.isin(x.references, ticked)] = 1.0
         for x in self.inputs:
-            if x.clocks & active and self.used & x.addresses.keys():
+            if x.clocks & active:
                 self._set_now(x)
         for x in self.outputs:
             if x.clocks & active:

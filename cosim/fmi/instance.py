@@ -46,8 +46,6 @@ class Exchange:
         for p in ports:
             self.addresses[p.name] = offset
             offset += 8 * p.size
-        if clocks:  # what it has until the clock ticks
-            self.values[:] = [x for p in ports for x in p.start_values()]
 
 
 class FMUInstance:
@@ -61,7 +59,6 @@ class FMUInstance:
         self.fmu = fmu
         self.failures = failures
         self.running = False
-        self.used = used
         #: states of the FMU that were got and not freed
         self.kept: list[Any] = []
         given = fmu.start_values()
@@ -78,6 +75,9 @@ class FMUInstance:
             self.stop()
             raise
         self.inputs = self._exchanges({n: p for n, p in fmu.input_ports.items() if n in used})
+        for x in self.inputs:
+            if x.clocks:  # what it has until the clock ticks, when alone it can be got
+                x.values[:] = [s for n in x.addresses for s in fmu.input_ports[n].start_values(given)]
         self.outputs = self._exchanges({n: p for n, p in fmu.output_ports.items() if n in used})
         #: the strings and binary data that were got last, by output (None before), and set last, by input
         self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}

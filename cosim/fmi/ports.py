@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
@@ -47,10 +47,13 @@ class FMUPort:
         """The number of values."""
         return math.prod(self.shape)
 
-    def start_values(self) -> list[float]:
-        """Return the start values of the model description, 0 where there are none."""
+    def start_values(self, start: Mapping[str, list[Any]]) -> list[float]:
+        """Return the start values: those given by variable, else the model description's, else 0."""
         found: list[float] = []
         for v in self.variables:
+            if v.name in start:
+                found += map(float, start[v.name])
+                continue
             given = [_NUMBERS.get(text, text) for text in (v.start or "0").split()]
             size = self.size // len(self.variables)
             found += [float(x) for x in (given if len(given) == size else given[:1] * size)]

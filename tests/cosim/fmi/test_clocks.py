@@ -96,6 +96,15 @@ def test_a_triggered_input_clock_ticks_when_it_is_not_0(path, as_block):
     assert list(result["m.kicked"]) == list(sums if as_block else [0.0, *sums[:-1]])
 
 
+def test_recording_a_clocked_input_does_not_set_it(path):
+    """Its start value is the one that was given, recorded or not."""
+    system = System({"b": Kicker(), "m": FMU(path, start={"kick_by": 5.0})}, [("b.go", "m.kick")])
+    plain = simulate(system, step=H, stop=20 * H, record=["m.kicked"])
+    recorded = simulate(system, step=H, stop=20 * H, record=["m.kicked", "m.kick_by"])
+    assert list(recorded["m.kicked"]) == list(plain["m.kicked"])
+    assert set(recorded["m.kick_by"]) == {5.0}
+
+
 def test_a_clock_may_drive_a_block_and_another_clock(path):
     """wrap of one FMU kicks the other one, by 1 each time; a block counts the same ticks."""
 
