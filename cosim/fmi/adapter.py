@@ -211,6 +211,7 @@ class Adapter(ABC):
         try:
             return call()
         except Exception as error:  # FMPy raises FMICallException and bare Exception alike
+            self.status = getattr(error, "status", self.status)
             if self.process is not None:
                 self.process.raise_interrupted()
             log = "".join(f"\n  {line}" for line in self.messages[-8:])

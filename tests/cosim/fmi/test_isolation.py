@@ -364,3 +364,11 @@ def test_the_c_code_compiles_without_a_warning(tmp_path):
     sources = sorted((Path(cosim.__file__).parent / "fmi" / "c").glob("*.c"))
     done = zig_cc([*options, f"-I{fmi_headers()}", *sources, "-o", tmp_path / "isolation"], tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_after_a_fatal_answer_nothing_is_called(tmp_path):
+    """Outside the loop as in it; this FMU crashes if it is freed nevertheless, which `close` would report."""
+    simulation = Simulation(driven(crash(tmp_path, "EnterInitializationMode fatal 0")), step=H)
+    with pytest.raises(FMUError, match=r"fmi2EnterInitializationMode failed with status 4 \(fatal\)"):
+        simulation.run(1.0)
+    simulation.close()

@@ -2,6 +2,7 @@
 
    The GUID of its model description says how: "FUNCTION WAY TIME", such as "DoStep null 0.5", makes
    fmi2DoStep write to address 0 when the time it was told is 0.5 or later. Before that it logs a line.
+   "FUNCTION fatal TIME" answers fmi2Fatal, and crashes when it is called once more to be freed.
    With CRASH_AT_LOAD in the environment, the library aborts when it is loaded. */
 
 #include <stdio.h>
@@ -32,6 +33,13 @@ static void crash(P, const char *function) {
     while (strcmp(p->way, "hang") == 0) sleep(1);
 }
 
+static fmi2Status answer(P, const char *function) {
+    if (strcmp(p->way, "fatal") != 0 || strcmp(p->function, function) != 0) return fmi2OK;
+    strcpy(p->function, "FreeInstance");
+    strcpy(p->way, "null");
+    return fmi2Fatal;
+}
+
 __attribute__((constructor)) static void at_load(void) {
     if (getenv("CRASH_AT_LOAD") != NULL) abort();
 }
@@ -57,7 +65,7 @@ EXPORT void fmi2FreeInstance(P) {
 #define FAILS(name)                                                                                          \
     EXPORT fmi2Status fmi2##name(P) {                                                                        \
         FAIL(name);                                                                                          \
-        return fmi2OK;                                                                                       \
+        return answer(p, #name);                                                                             \
     }
 FAILS(Reset) FAILS(Terminate) FAILS(EnterInitializationMode) FAILS(ExitInitializationMode) FAILS(EnterEventMode)
 FAILS(EnterContinuousTimeMode) FAILS(SetDebugLogging) FAILS(CancelStep)
