@@ -20,7 +20,7 @@ from typing import TypeAlias
 import numpy as np
 
 from .errors import SimulationError, WiringError
-from .failures import Failures
+from .failures import EndOfRun, Failures
 from .fmi.co_simulation import CoSimulationInstance
 from .fmi.model_exchange import ModelExchangeInstance
 from .instances import KernelInstance
@@ -94,11 +94,6 @@ class IteratedCoupling:
         """Return the memory that belongs to the state of a simulation."""
         return [self._w, self._before, *self._solver.arrays()]
 
-    @property
-    def repetitions(self) -> int:
-        """How often a step was taken in all, repetitions included."""
-        return int(self._solver.evaluations[0])
-
     def start(self, t0: float) -> None:
         """Let the outputs at t_0 agree with the inputs that they are."""
         self._t0 = t0
@@ -115,9 +110,12 @@ class IteratedCoupling:
             self._run_once(look, t0, 0)
             return self._outputs()
 
-        self._run_once(look, t0, 0)
         solver = QuasiNewton(len(self._w), self._solver.tolerance)
-        self._w[:] = self._before[:] = self._solved(solver, g, self._outputs(), t0)
+        try:
+            self._run_once(look, t0, 0)
+            self._w[:] = self._before[:] = self._solved(solver, g, self._outputs(), t0)
+        except EndOfRun as end:
+            raise SimulationError(f"{end.text}, which is its start") from None
 
     def _step(self, t: float, h: float) -> None:
         """Take the step from t; the outputs are left as they are at t + h."""

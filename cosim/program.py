@@ -408,6 +408,8 @@ class Program:
         """Initialize the participants."""
         for instance in self.instances.values():
             instance.start(t0)
+            if isinstance(self.failures.exception, KeyboardInterrupt):
+                raise self.failures.exception
             if self.failures.exception is not None:
                 raise self.failures.error()
         if self.iteration is not None:
@@ -433,7 +435,7 @@ class Program:
     def run_once(self, loop: Loop, t0: float, k: int) -> None:
         """Run operations of a loop of their own once, at t_k = t0 + k h; raise what ends the run."""
         if loop.run(k, k + 1, k, t0, self.h):
-            if isinstance(self.failures.exception, EndOfRun):
+            if isinstance(self.failures.exception, (EndOfRun, KeyboardInterrupt)):
                 raise self.failures.exception
             row, _, status = (int(x) for x in loop.report[:3])
             raise self.error(loop.rows[row], t0, k, status)

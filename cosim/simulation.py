@@ -220,7 +220,7 @@ class Simulation:
             if len(x):
                 program.statistics[:] = np.column_stack([x, x, x, x * x])
             loop.report[4] = 1
-            if self._k % self.decimation == 0:
+            if self._k % self.decimation == 0 and (program.columns or program.recorded_texts):
                 self._data[0] = program.values(program.recorded_addresses)
                 program.keep_texts()
                 loop.report[3] = 1
@@ -245,11 +245,11 @@ class Simulation:
         failures = self._program.failures
         self._began = time.perf_counter()
         begin, chunk = self._k, 1  # grows: a slow callback must not hold up progress and Ctrl-C
-        self._incomplete = True  # until the loop is back
         try:
             while self._k < last or not self._acted:
                 until = min(self._k + chunk, last + 1)
                 before = time.perf_counter()
+                self._incomplete = True  # until the loop is back
                 if loop.run(self._k, until, last, self.start, self.step, self._acted):
                     row, self._k, status = (int(x) for x in loop.report[:3])
                     self._acted = False
@@ -262,8 +262,8 @@ class Simulation:
                 self._acted = self._k < until  # the last point, or where a participant asked to end
                 if failures.end and self._acted:
                     return self._end(failures.end)
+                self._incomplete = False
                 if failures.interrupted:
-                    self._incomplete = False
                     raise KeyboardInterrupt
                 took = time.perf_counter() - before
                 chunk = max(1, min(int(chunk * 0.1 / max(took, 1e-6)), 4 * chunk, 1_000_000))
@@ -275,7 +275,6 @@ class Simulation:
         except SimulationError as error:
             error.result = self._result(interrupted=True)
             raise
-        self._incomplete = False
         return self._result()
 
     def _end(self, text: str) -> Result:

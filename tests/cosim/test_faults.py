@@ -177,6 +177,45 @@ def test_ctrl_c_in_a_callback_keeps_what_was_computed():
     assert caught.value.result.interrupted
 
 
+class PressesAtOnce(Presses):
+    """Ctrl-C while it is initialized."""
+
+    def initialize(self):
+        raise KeyboardInterrupt
+
+
+class Follows(Continuous):
+    """x' = u - x, in Python; Ctrl-C when its output is read after t = 0.25."""
+
+    compiled = False
+    until = Parameter(0.25)
+    u = Input()
+    x = State(1.0)
+    y = Output()
+
+    def derivatives(self, t):
+        self.der_x = self.u - self.x
+
+    def outputs(self, t):
+        if t > self.until:
+            raise KeyboardInterrupt
+        self.y = self.x
+
+
+@pytest.mark.parametrize(("until", "points"), [(0.25, 3), (-1.0, 0)])
+def test_ctrl_c_in_iterated_coupling_keeps_what_was_computed(until, points):
+    system = System({"a": Follows(until=until), "b": Follows(until=9.0)}, [("a.y", "b.u"), ("b.y", "a.u")])
+    with pytest.raises(Interrupted) as caught:
+        simulate(system, step=0.1, stop=9.0, coupling="iterated")
+    assert len(caught.value.result.time) == points
+
+
+def test_ctrl_c_while_a_block_is_initialized():
+    with pytest.raises(Interrupted) as caught:
+        simulate(System({"p": PressesAtOnce()}), step=0.1, stop=9.0)
+    assert len(caught.value.result.time) == 0
+
+
 SIGNAL = """
     import os, signal, sys, threading, time
     from cosim import Block, State, System, simulate, Interrupted

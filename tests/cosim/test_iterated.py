@@ -21,6 +21,7 @@ from cosim.errors import SimulationError, TimeError, WiringError
 from cosim.quasi_newton import NoConvergence, QuasiNewton
 from fmus.export import export
 
+from .fmi.metronome import metronome
 from .fmi.probe import probe
 from .parts import Gain, Mass, Ramp
 
@@ -196,6 +197,35 @@ def test_newton_solves_linear_systems_at_once_and_keeps_its_jacobian():
 def test_newton_says_when_there_is_no_solution():
     with pytest.raises(NoConvergence):
         QuasiNewton(1, 1e-9).solve(lambda w: w + 1.0 + w * w, np.array([0.3]))
+
+
+def test_a_trial_that_goes_far_does_not_loosen_the_tolerance():
+    """w^2 = 1 from 0.02: the first step goes to 25, where the residual is 600 times that of the solution."""
+    w = QuasiNewton(1, 1e-3).solve(lambda w: w - (w * w - 1.0), np.array([0.02]))
+    assert abs(w[0] * w[0] - 1.0) <= 1e-3 * 1.001  # of |g(w)|, which is 1 to the tolerance
+
+
+class Backwards(LinearContinuous):
+    """x' = -x, y = -1 - u / 2"""
+
+    u = Input()
+    x = State(1.0)
+    y = Output()
+
+    def derivatives(self, t):
+        self.der_x = -self.x
+
+    def outputs(self, t):
+        self.y = -1.0 - 0.5 * self.u
+
+
+def test_an_fmu_that_asks_to_end_while_the_start_is_iterated(tmp_path):
+    """A negative rate, set as a discrete input, is an event in which the metronome asks to end."""
+    system = System({"m": FMU(metronome(tmp_path / "m.fmu"), event_mode=True), "b": Backwards()})
+    system.connect("m.x", "b.u")
+    system.connect("b.y", "m.rate")
+    with pytest.raises(SimulationError, match=r"m asked to end .* at t = 0 s, which is its start"):
+        simulate(system, step=0.25, stop=1.0, coupling="iterated")
 
 
 class Jumps(LinearContinuous):

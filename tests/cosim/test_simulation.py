@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cosim import FMU, Block, Continuous, Input, Output, Simulation, State, System, simulate
+from cosim import FMU, Block, Continuous, Input, Interrupted, Output, Simulation, State, System, simulate
 from cosim.blocks import SensorDynamics, WhiteNoise
 from cosim.errors import SimulationError, SnapshotError, TimeError
 from fmus.export import export
@@ -211,3 +211,23 @@ def test_running_back_is_refused():
         with pytest.raises(TimeError, match=r"0\.64 s is 6\.4 communication steps"):
             simulation.run(0.64)
         assert simulation.run(0.6).steps == 1
+
+
+def test_a_simulation_goes_on_after_progress_was_stopped():
+    """What `progress` raises leaves the simulation at a communication point."""
+    system = System({"m": Mass()})
+    whole = simulate(system, step=1e-3, stop=1.0, record=["m.x"])
+    with Simulation(system, step=1e-3, record=["m.x"]) as simulation:
+
+        def stop(done, of):
+            raise KeyboardInterrupt
+
+        with pytest.raises(Interrupted) as caught:
+            simulation.run(1.0, progress=stop)
+        rest = simulation.run(1.0)
+    assert np.array_equal(np.concatenate([caught.value.result["m.x"], rest["m.x"]]), whole["m.x"])
+
+
+def test_without_records_there_are_no_recorded_times():
+    with Simulation(System({"m": Mass()}), step=0.1, record=[], statistics=["m.x"]) as simulation:
+        assert [len(simulation.run(until).time) for until in (0.5, 1.0)] == [0, 0]

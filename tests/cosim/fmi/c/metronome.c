@@ -8,7 +8,8 @@
 
    Event mode used: the events are handled there, at their instant if early return is allowed, else at the
    end of the step; without, inside the step. Discrete inputs are set in event mode only, clocked variables
-   while their clock is active. From the time `stuck` on doStep returns early without getting on. */
+   while their clock is active. From the time `stuck` on doStep returns early without getting on. An event
+   with a negative rate asks to end the simulation. */
 
 #include <math.h>
 #include <stdarg.h>
@@ -136,7 +137,8 @@ EXPORT fmi3Status fmi3UpdateDiscreteStates(P, bool *again, bool *end, bool *nomi
     if (p->active[KICK]) p->v[KICKED] += p->v[KICK_BY];
     memset(p->active, 0, sizeof p->active);
     *again = p->active[WRAP] = p->v[X] >= 1.0;
-    *end = *nominals = *states = false;
+    *end = p->v[RATE] < 0.0;
+    *nominals = *states = false;
     *timed = p->v[BEAT] > 0.0;
     *next = next_beat(p);
     return fmi3OK;
