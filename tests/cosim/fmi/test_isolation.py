@@ -314,6 +314,7 @@ HANG = """
     import os, signal, sys, threading, time
     from cosim import FMU, System, simulate, Interrupted
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
     plant = FMU(sys.argv[1], isolated=True)
     threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
