@@ -114,6 +114,11 @@ class KernelInstance:
     #: Python can be copied, and so can the record
     can_save = can_serialise = True
 
+    def kind(self) -> tuple[Any, ...]:
+        """Return what another instance has to share to take back what this one saves."""
+        made = type(self.participant)
+        return made.__module__, made.__qualname__, self.is_compiled, self.participant.memory.size
+
     def save(self, serialised: bool = True) -> tuple[Array, dict[str, Any]]:
         """Return a copy of the record, and of what a block in Python keeps beside it."""
         attributes = {} if self.is_compiled else self.participant.own_attributes()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from .program import Program
 from .result import Result
-from .simulation import Coupling, Simulation, Solver, check_choices, check_time
+from .simulation import Coupling, Simulation, Solver, check_choices, check_system, check_time
 from .system import System
 from .time_grid import steps_between
 
@@ -75,6 +75,7 @@ def simulate(
 
 def schedule(system: System, *, step: float, coupling: Coupling = "sampled", solver: Solver = "ode3") -> str:
     """Return what happens in one communication step, a line an operation."""
+    check_system(system)
     check_time(step, 0.0)
     check_choices(coupling, solver, 1, 1e-8)
     program = Program(system, float(step), coupling, solver, [], [], 1, True)

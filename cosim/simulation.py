@@ -80,6 +80,8 @@ class Snapshot:
     parts: dict[str, Any]
     memory: list[Array]
     owner: object
+    #: what a simulation has to share to return to it
+    kind: tuple[Any, ...]
 
 
 class Simulation:
@@ -103,6 +105,7 @@ class Simulation:
         jit: bool = True,
         tolerance: float = 1e-8,
     ) -> None:
+        check_system(system)
         check_time(step, start)
         check_choices(coupling, solver, decimation, tolerance)
         self.system = system
@@ -301,11 +304,23 @@ class Simulation:
         parts = {name: instance.save() for name, instance in self._program.instances.items()}
         portable = all(instance.can_serialise for instance in self._program.instances.values())
         memory = [array.copy() for array in self._program.memory]
-        return Snapshot(self.time, portable, (self._k, self._acted), parts, memory, self._token)
+        place = self._k, self._acted
+        return Snapshot(self.time, portable, place, parts, memory, self._token, self._kind())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Return to a snapshot; what was recorded since then stays in the results that were returned."""
+        """Return to a snapshot; what was recorded since then stays in the results that were returned.
+
+        One that was taken of another simulation serves if that has the same participants and
+        options. Raises SnapshotError if it does not serve.
+        """
         self._check_open("restore a snapshot")
+        if not isinstance(snapshot, Snapshot):
+            raise SnapshotError(f"{snapshot!r} is no snapshot; give what `snapshot` returned")
+        if snapshot.kind != self._kind():
+            raise SnapshotError(
+                f"the snapshot at t = {snapshot.time:g} s is of another simulation: participants, connected "
+                "and recorded ports, step, start, coupling, solver and jit have to be the same"
+            )
         if snapshot.owner is not self._token and not snapshot.portable:
             raise SnapshotError(
                 f"the snapshot at t = {snapshot.time:g} s serves only the simulation that it was taken of: "
@@ -340,6 +355,11 @@ class Simulation:
             other.close()
             raise
         return other
+
+    def _kind(self) -> tuple[Any, ...]:
+        options = tuple(self._options[name] for name in ("coupling", "solver"))
+        parts = tuple((name, instance.kind()) for name, instance in self._program.instances.items())
+        return self.step, self.start, options, parts, tuple(array.shape for array in self._program.memory)
 
     def _unable(self, capability: str) -> str:
         found = [n for n, i in self._program.instances.items() if not getattr(i, capability)]
@@ -401,6 +421,12 @@ class Simulation:
 # --------------------------------------------------------------------------------- checks
 
 
+def check_system(system: object) -> None:
+    """Refuse what is no system."""
+    if not isinstance(system, System):
+        raise WiringError(f"{system!r} is no System; give System({{'plant': ...}}, [...])")
+
+
 def check_time(step: float, start: float, stop: float | None = None) -> None:
     """Refuse what is no step, no start or no stop, in s."""
     named = {"step": step, "start": start} | ({} if stop is None else {"stop": stop})
@@ -417,7 +443,7 @@ def check_choices(coupling: str, solver: str, decimation: int, tolerance: float)
     """Refuse a coupling, a solver, a decimation or a tolerance that is none."""
     if coupling not in get_args(Coupling):
         raise TimeError(f"coupling '{coupling}' is not known" + did_you_mean(coupling, get_args(Coupling)))
-    if solver not in TABLEAUS:
+    if solver not in tuple(TABLEAUS):
         raise TimeError(f"solver '{solver}' is not known" + did_you_mean(solver, TABLEAUS))
     if not isinstance(decimation, Integral) or decimation < 1:
         raise TimeError(f"decimation={decimation!r} is no whole number of steps, 1 or more")
@@ -428,7 +454,10 @@ def check_choices(coupling: str, solver: str, decimation: int, tolerance: float)
 def _names(names: Iterable[str]) -> list[str]:
     if isinstance(names, str):
         raise WiringError(f"'{names}' is one name; give a list of ports, [\"{names}\"]")
-    return list(names)
+    found = list(names) if isinstance(names, Iterable) else [None]
+    if not all(isinstance(name, str) for name in found):
+        raise WiringError(f'{names!r} is no list of ports, such as ["plant.x"]')
+    return found
 
 
 def _texts(system: System, names: list[str] | None) -> tuple[list[TextPort], list[str] | None]:

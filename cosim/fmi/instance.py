@@ -155,6 +155,11 @@ class FMUInstance:
         """Tell whether the FMU can give its state as bytes."""
         return bool(self.can_save and self.fmi.interface.canSerializeFMUstate)
 
+    def kind(self) -> tuple[Any, ...]:
+        """Return what another instance has to share to take back what this one saves."""
+        ports = tuple(tuple(x.elements) for x in [*self.inputs, *self.outputs])
+        return self.fmu.description.guid, self.model_exchange, self.fmu.event_mode, ports
+
     def save(self, serialised: bool = True) -> tuple[Any, ...]:
         """Return buffers and texts, and the state of the FMU: as bytes if it can, else kept until `stop`."""
         state = self.fmi.attempt("get its state", self.api.getFMUState)

@@ -231,3 +231,35 @@ def test_a_simulation_goes_on_after_progress_was_stopped():
 def test_without_records_there_are_no_recorded_times():
     with Simulation(System({"m": Mass()}), step=0.1, record=[], statistics=["m.x"]) as simulation:
         assert [len(simulation.run(until).time) for until in (0.5, 1.0)] == [0, 0]
+
+
+def test_a_snapshot_of_another_simulation_is_refused(paths):
+    """Unless that has the same participants and options, and what it keeps therefore the same meaning."""
+
+    def standing(plant, **options) -> Simulation:
+        return Simulation(System({"p": plant}), **({"step": 0.1} | options))
+
+    with standing(FMU(paths["2.0"])) as simulation, standing(Mass()) as other:
+        wanted = simulation.run(0.5)["p.x"][-1]
+        there, mass = simulation.snapshot(), other.snapshot()
+    with standing(FMU(paths["2.0"], isolated=True)) as same:
+        same.restore(there)
+        assert np.array_equal(same.run(0.6)["p.x"][0], wanted)
+    for plant, options in (
+        (FMU(paths["2.0"]), {"step": 0.2}),
+        (FMU(paths["2.0"]), {"start": 1.0}),
+        (FMU(paths["2.0"]), {"record": ["p.a"]}),
+        (FMU(paths["2.0"], interface="ModelExchange"), {}),
+        (FMU(paths["3.0"]), {}),
+        (Mass(), {}),
+    ):
+        with (
+            standing(plant, **options) as simulation,
+            pytest.raises(SnapshotError, match=r"the snapshot at t = 0\.5 s is of another simulation"),
+        ):
+            simulation.restore(there)
+    for options in ({"jit": False}, {"coupling": "continuous"}):
+        with standing(Mass(), **options) as simulation, pytest.raises(SnapshotError, match="another simul"):
+            simulation.restore(mass)
+    with standing(Mass()) as simulation, pytest.raises(SnapshotError, match="None is no snapshot"):
+        simulation.restore(None)
