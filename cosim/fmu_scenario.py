@@ -38,7 +38,7 @@ def fmu_scenario(path: Path) -> Scenario:
         input: Path | None = None,
         start: tuple[str, ...] = (),
     ) -> System:
-        values = _start_values(FMU(path), start) if start else {}
+        values = start_values(FMU(path), start) if start else {}
         fmu = FMU(
             path,
             start=values,
@@ -172,7 +172,7 @@ def _time(fmu: FMU, asked: float | None, default: Any, name: str) -> float | Non
     return value
 
 
-def _start_values(fmu: FMU, pairs: tuple[str, ...]) -> dict[str, Any]:
+def start_values(fmu: FMU, pairs: tuple[str, ...]) -> dict[str, Any]:
     """Return start values from texts such as m=2.5, name=text, u=1 2 3."""
     found: dict[str, Any] = {}
     for pair in pairs:

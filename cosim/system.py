@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
+from types import NoneType
 from typing import TypeAlias
 
 import numpy as np
@@ -103,10 +104,14 @@ class System:
         #: the connections of every input port, and the pairs of participants that are connected without delay
         self._feeding: dict[tuple[str, str], list[Connection]] = {}
         self._links: set[tuple[str, str]] = set()
+        if not isinstance(participants, (Mapping, NoneType)):
+            raise WiringError(f"{participants!r} is no dictionary of participants, such as {{'plant': ...}}")
         for name, member in (participants or {}).items():
             self.add(name, member)
-        for source, target in connections:
-            self.connect(source, target)
+        for connection in connections:
+            if not isinstance(connection, (tuple, list)) or len(connection) != 2:
+                raise WiringError(f"{connection!r} is no connection; write ('plant.x', 'control.x')")
+            self.connect(*connection)
 
     def add(self, name: str, member: Member) -> None:
         """Add a participant under a name (letters, digits, underscores)."""
@@ -140,6 +145,9 @@ class System:
         (factor, offset), target = factor * source + offset, takes the place of the units'
         conversion. A String of an FMU goes to a String input, a Binary to a Binary one.
         """
+        for name in (source, target):
+            if not isinstance(name, str):
+                raise WiringError(f"{name!r} is no port; write participant.port, as text")
         texts = text_connection(self, source, target, initial is None and transformation is None)
         if texts is not None:
             self._add_texts(texts)
@@ -159,7 +167,7 @@ class System:
             ):
                 raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
         try:
-            scale, offset = transformation or conversion(out.unit, into.unit)
+            scale, offset = _factors(transformation) or conversion(out.unit, into.unit)
             if transformation is None and (self.is_relative(out) or self.is_relative(into)):
                 offset = 0.0
         except WiringError as error:
@@ -240,6 +248,16 @@ class System:
             return list(TopologicalSorter(graph).static_order())
         except CycleError as error:
             raise WiringError(cycle_text(error.args[1], self.connections)) from None
+
+
+def _factors(transformation: object) -> tuple[float, float] | None:
+    if transformation is None:
+        return None
+    try:
+        scale, offset = map(float, transformation)  # type: ignore[call-overload]
+    except (TypeError, ValueError):
+        raise WiringError(f"transformation={transformation!r} is no (factor, offset)") from None
+    return scale, offset
 
 
 def _initial(source: Port, value: Array | float | None) -> Array | None:

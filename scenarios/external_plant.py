@@ -11,6 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cosim import FMU, Block, Input, Output, Parameter, Result, System, simulate
+from cosim.fmu_scenario import start_values
 from cosim.functions import clip
 from fmus.cached import as_fmu
 from fmus.oscillator import Oscillator
@@ -37,8 +38,8 @@ def build(
     damping: float = 0.4e-3,
 ) -> System:
     """Return the system; the options are those of `run`."""
-    values = {name: float(value) for name, _, value in (text.partition("=") for text in start)}
-    plant = FMU(fmu or as_fmu(Oscillator()).path, start=values)
+    path = fmu or as_fmu(Oscillator()).path
+    plant = FMU(path, start=start_values(FMU(path), start))
     return System(
         {"plant": plant, "control": Damping(c=damping)},
         [(f"plant.{velocity}", "control.v"), ("control.F", f"plant.{force}")],

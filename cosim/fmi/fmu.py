@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from numbers import Real
 from os import PathLike
 from pathlib import Path
+from types import NoneType
 from typing import Any, Literal
 
 import numpy as np
@@ -93,11 +94,15 @@ class FMU:
         sample_period: float | None = None,
         isolated: bool = False,
     ) -> None:
+        if not isinstance(path, (str, PathLike)):
+            raise FMUError(f"{path!r} is no path of an FMU")
         self.path = Path(path)
         #: the participant that was exported to this file, where that is known
         self.source: Participant | None = None
         #: what has to live as long as the file does, such as the folder that holds it
         self.kept: object = None
+        if not isinstance(start, (Mapping, NoneType)):
+            raise FMUError(f"{self.path.name}: start={start!r} has no names; write {{'m': 2.0}}")
         self.start = dict(start or {})
         self.interface = interface
         self.solver = solver
@@ -159,7 +164,7 @@ class FMU:
                 "not supported; export it with one of them"
             )
         has = {"CoSimulation": self.has_cs, "ModelExchange": self.has_me}
-        if self.interface is not None and self.interface not in has:
+        if self.interface is not None and self.interface not in tuple(has):
             raise FMUError(
                 f"{self.path.name}: interface '{self.interface}' is not known"
                 + did_you_mean(self.interface, has)

@@ -152,7 +152,11 @@ class Chain(Block):
         ({"decimation": 2.5}, "decimation=2.5"),
         ({"coupling": "sample"}, "did you mean 'sampled'"),
         ({"solver": "ode5", "coupling": "continuous"}, "solver 'ode5' is not known"),
+        ({"coupling": None}, "coupling 'None' is not known"),
+        ({"solver": ["ode3"]}, "is not known; did you mean 'ode3'"),
         ({"record": "ramp.u"}, "give a list of ports"),
+        ({"record": [1]}, "is no list of ports"),
+        ({"statistics": 5}, "5 is no list of ports"),
     ],
 )
 def test_what_does_not_fit_the_grid_is_refused(options, words):

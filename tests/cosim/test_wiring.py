@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cosim import Block, Input, Output, Parameter, System, simulate
+from cosim import Block, Input, Output, Parameter, System, schedule, simulate
 from cosim.errors import CosimError, WiringError
 
 from .parts import Gain, Mass, Ramp
@@ -59,6 +59,8 @@ WRONG = [
     ("plnt.x", "g.x", r"there is no participant 'plnt'; did you mean 'plant'"),
     ("plant.xx", "g.x", r"plant has no output 'xx'.*there are: a, x, v"),
     ("a.acel", "g.x", r"a has no output 'acel'; did you mean 'accel'"),
+    (None, "g.x", r"None is no port; write participant.port, as text"),
+    ("plant.x", 1, r"1 is no port"),
     ("plant", "g.x", r"'plant' is no port; write participant.port"),
     ("plant.u", "g.x", r"plant.u is an input, not an output"),
     ("plant.x", "g.u", r"g.u is an output, not an input"),
@@ -82,6 +84,19 @@ def test_wrong_connections_say_where_what_and_the_remedy(source, target, words):
     with pytest.raises(WiringError, match=words):
         system.connect(source, target)
     assert system.connections == []
+
+
+def test_what_is_no_system_is_refused():
+    with pytest.raises(WiringError, match=r"'plant\.fmu' is no System"):
+        simulate("plant.fmu", step=0.1, stop=1.0)
+    with pytest.raises(WiringError, match="is no System"):
+        schedule(None, step=0.1)
+    with pytest.raises(WiringError, match="is no dictionary of participants"):
+        System([Mass()])
+    with pytest.raises(WiringError, match=r"\('m\.x',\) is no connection; write"):
+        System({"m": Mass()}, [("m.x",)])
+    with pytest.raises(WiringError, match=r"transformation=3 is no \(factor, offset\)"):
+        System({"m": Mass(), "g": Gain()}).connect("m.x", "g.x", transformation=3)
 
 
 def test_an_input_has_one_source():

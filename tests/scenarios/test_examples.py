@@ -13,6 +13,7 @@ import pytest
 
 from cosim import Result, simulate
 from cosim.app import main
+from cosim.errors import FMUError
 from fmus.export import export
 from scenarios import building_in_fmpy, controller_in_ssp, external_plant
 from tests.others import swing
@@ -48,6 +49,15 @@ def test_a_controller_on_somebody_elses_plant(
         v += 0.01 * (u - 8.0 * x) / 4.0
         x += 0.01 * v
     assert np.array_equal(result["plant.x"], xs)
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [("k=abc", "--start k=abc: 'abc' is no value"), ("k", "write name=value"), ("kk=1", "did you mean 'k'")],
+)
+def test_start_values_of_the_plant_that_are_none(start: str, words: str) -> None:
+    with pytest.raises(FMUError, match=words):
+        external_plant.build(start=(start,))
 
 
 def test_units_of_the_plant_are_heeded() -> None:

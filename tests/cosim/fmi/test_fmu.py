@@ -83,12 +83,25 @@ def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
         ({"kk": 1.0}, "no variable 'kk'; did you mean 'k'"),
         ({"k": "stiff"}, "start value k = 'stiff' is no number with a unit"),
         ({"k": np.nan}, "is no Real"),
+        ({1: 2.0}, "has no variable '1'"),
+        ([1.0, 2.0], r"start=\[1.0, 2.0\] has no names"),
         ({"u": [1.0, 2.0, 3.0]}, r"is no Real of shape \(2,\)"),
     ],
 )
 def test_wrong_start_values_are_refused(fmu_path, start, words):
     with pytest.raises(FMUError, match=words):
         FMU(fmu_path, start=start)
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ({"interface": ["CoSimulation"]}, "is not known"), ({"interface": 2}, "interface '2' is not known"),
+    ({"solver": 4, "interface": "ModelExchange"}, "solver '4' is not known"),
+])  # fmt: skip
+def test_options_that_are_none(fmu_path, options, words):
+    with pytest.raises(FMUError, match=words):
+        FMU(fmu_path, **options)
+    with pytest.raises(FMUError, match="None is no path of an FMU"):
+        FMU(None)
 
 
 def copy_without(source, target, keep=lambda name: True, change=lambda name, data: data):
