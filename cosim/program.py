@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import groupby
 from typing import Any, TypeAlias
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -50,6 +51,10 @@ Table: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 Instance: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInstance
 #: what stage coupling integrates
 Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
+
+
+#: who has FMUs that can be there once only, by token
+_ALONE: WeakValueDictionary[str, Program] = WeakValueDictionary()
 
 
 class Program:
@@ -166,7 +171,13 @@ class Program:
                 "per process; run each in a process of its own, FMU(..., isolated=True)"
             )
         if interface.canBeInstantiatedOnlyOncePerProcess:
+            if description.guid in _ALONE:
+                raise WiringError(
+                    f"{name} ({fmu.path.name}) can be instantiated only once per process, and a simulation "
+                    "that is open has it; close that first, or say FMU(..., isolated=True)"
+                )
             self._alone[description.guid] = name
+            _ALONE[description.guid] = self
 
     def _rate(self, name: str) -> int | None:
         """Return every how many steps a block acts; None when it follows the coupling."""
@@ -178,7 +189,10 @@ class Program:
 
     def close(self) -> list[str]:
         """Free the FMU instances; return what isolated ones crashed in that, and how."""
-        return [crash for instance in self.instances.values() if (crash := instance.stop())]
+        crashes = [crash for instance in self.instances.values() if (crash := instance.stop())]
+        for token in self._alone:
+            _ALONE.pop(token, None)
+        return crashes
 
     def _is_block(self, name: str) -> bool:
         return is_block(self.system.participants[name])

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from cosim import FMU, Block, Continuous, Input, Interrupted, Output, Simulation, State, System, simulate
 from cosim.blocks import SensorDynamics, WhiteNoise
-from cosim.errors import SimulationError, SnapshotError, TimeError
+from cosim.errors import SimulationError, SnapshotError, TimeError, WiringError
 from fmus.export import export
 
-from .fmi.probe import probe
+from .fmi.probe import changed, probe
 from .fmi.test_fmu import Chain
 from .parts import Gain, Mass
 
@@ -263,3 +263,21 @@ def test_a_snapshot_of_another_simulation_is_refused(paths):
             simulation.restore(mass)
     with standing(Mass()) as simulation, pytest.raises(SnapshotError, match="None is no snapshot"):
         simulation.restore(None)
+
+
+def test_an_fmu_that_is_there_once_is_not_branched(paths, tmp_path):
+    """A second simulation would be a second instance in this process."""
+
+    def once(name: str, content: bytes) -> bytes:
+        says = b'canBeInstantiatedOnlyOncePerProcess="true" canGetAndSetFMUstate'
+        return content.replace(b"canGetAndSetFMUstate", says) if name == "modelDescription.xml" else content
+
+    path = changed(tmp_path / "once.fmu", paths["2.0"], once)
+    for _ in range(2):  # closed, it may be made again
+        with Simulation(System({"p": FMU(path)}), step=0.1) as simulation:
+            simulation.run(0.5)
+            with pytest.raises(WiringError, match=r"p \(once\.fmu\) can be instantiated only once .* open"):
+                simulation.branch()
+            assert simulation.run(0.6).steps == 1
+    with Simulation(System({"p": FMU(path, isolated=True)}), step=0.1) as simulation:
+        simulation.branch().close()
