@@ -1,9 +1,11 @@
 /* Waiting for the other process: watch the word, as the answer mostly comes at once, then sleep.
 
    Sleeping lets the other process run where all cores are busy, and watching in vain keeps it from
-   running. So who had to sleep watches shortly the next times; now and then it watches long again,
-   because the cores may have become free. Linux wakes the sleeper through a futex; elsewhere there
-   is nothing of that kind between processes, and it looks again after growing pauses. */
+   running; but to be woken costs more than all the rest where a core is free. So who watched long in
+   vain watches shortly the next times, until it sees the other one answer without sleeping, which
+   then runs beside it. Now and then it watches long again, because a core may have become free: soon
+   at first, and ever more seldom while it is in vain. Linux wakes the sleeper through a futex;
+   elsewhere there is nothing of that kind between processes, and it looks again after growing pauses. */
 
 #if defined __linux__
 #define _GNU_SOURCE /* syscall */
@@ -22,7 +24,8 @@
 enum {
     LONG_WATCH = 50000, /* ns */
     SHORT_WATCH = 300,
-    TRY_AGAIN = 256, /* waits */
+    TRY_SOON = 16, /* waits until the next long watch */
+    TRY_SELDOM = 1024,
     LONGEST_SLEEP = 50000000,
 };
 
@@ -88,10 +91,18 @@ static void sleep_until(_Atomic uint32_t *word, uint32_t number, struct waiting 
 
 bool channel_wait(_Atomic uint32_t *word, uint32_t number, struct waiting *self)
 {
-    const bool is_long = !self->hasty || ++self->often % TRY_AGAIN == 0;
+    const bool is_long = !self->hasty || self->until_long == 0;
     const bool came = watch(word, number, is_long ? LONG_WATCH : SHORT_WATCH);
-    if (is_long)
-        self->hasty = !came;
+    if (came) {
+        self->hasty = false;
+        self->interval = TRY_SOON;
+    } else if (is_long) {
+        self->interval = self->hasty && self->interval < TRY_SELDOM ? 2 * self->interval : self->interval;
+        self->until_long = self->interval;
+        self->hasty = true;
+    } else {
+        self->until_long--;
+    }
     if (!came)
         sleep_until(word, number, self);
     return atomic_load(word) == number;

@@ -56,7 +56,7 @@ struct log_line {
 /* What one side knows about how to wait for the other. */
 struct waiting {
     _Atomic uint32_t sleeps;
-    uint32_t often; /* waits in haste */
+    uint32_t until_long, interval; /* waits in haste until the next long one, and at the beginning */
     bool hasty;     /* watching long was in vain last time */
 };
 
