@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from .program import Program
 from .result import Result
-from .simulation import Coupling, Simulation, Solver, check_choices, check_system, check_time
+from .simulation import Coupling, Simulation, Solver, check_choices, check_stop, check_system, check_time
 from .system import System
 from .time_grid import steps_between
 
@@ -56,7 +56,8 @@ def simulate(
     that is no error: the result up to there is returned, `result.ended` says who and when,
     and SimulationEndedWarning is warned.
     """
-    check_time(step, start, stop)
+    check_time(step, start)
+    check_stop(stop, start)
     steps_between(stop - start, step, "the time from start to stop")  # before FMUs are loaded
     with Simulation(
         system,

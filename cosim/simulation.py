@@ -179,7 +179,7 @@ class Simulation:
         or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C. When a
         participant asks to end the run, what was computed is returned: `Result.ended`.
         """
-        check_time(self.step, self.start, until)
+        check_stop(until, self.start)
         last = steps_between(until - self.start, self.step, "the time from start to stop")
         if last < self._k or (last == self._k and self._acted):
             raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
@@ -427,16 +427,24 @@ def check_system(system: object) -> None:
         raise WiringError(f"{system!r} is no System; give System({{'plant': ...}}, [...])")
 
 
-def check_time(step: float, start: float, stop: float | None = None) -> None:
-    """Refuse what is no step, no start or no stop, in s."""
-    named = {"step": step, "start": start} | ({} if stop is None else {"stop": stop})
-    for name, value in named.items():
-        if not isinstance(value, Real) or not math.isfinite(value):
-            raise TimeError(f"{name}={value!r} is no finite number of seconds")
+def check_time(step: float, start: float) -> None:
+    """Refuse what is no step or no start, in s."""
+    _check_seconds("step", step)
+    _check_seconds("start", start)
     if step <= 0.0:
         raise TimeError(f"step={step:g} s; a communication step is above zero")
-    if stop is not None and stop <= start:
+
+
+def check_stop(stop: float, start: float) -> None:
+    """Refuse what is no stop after a start, in s."""
+    _check_seconds("stop", stop)
+    if stop <= start:
         raise TimeError(f"stop={stop:g} s is not after start={start:g} s")
+
+
+def _check_seconds(name: str, value: object) -> None:
+    if not isinstance(value, Real) or not math.isfinite(value):
+        raise TimeError(f"{name}={value!r} is no finite number of seconds")
 
 
 def check_choices(coupling: str, solver: str, decimation: int, tolerance: float) -> None:

@@ -148,6 +148,7 @@ class Chain(Block):
         ({"step": 1e-320}, "more than can be counted"),
         ({"stop": 0.0}, "is not after start"),
         ({"stop": math.inf}, "no finite number"),
+        ({"stop": None}, "stop=None is no finite number"),
         ({"decimation": 0}, "decimation=0"),
         ({"decimation": 2.5}, "decimation=2.5"),
         ({"coupling": "sample"}, "did you mean 'sampled'"),
