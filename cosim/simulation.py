@@ -38,6 +38,7 @@ from .errors import (
 )
 from .failures import EndOfRun, ctrl_c
 from .fmi.fmu import FMU
+from .fmi.instance import FMUInstance
 from .fmi.text_ports import TextPort, text_port
 from .loop import Loop
 from .program import Program
@@ -338,7 +339,8 @@ class Simulation:
     def branch(self) -> Simulation:
         """Return a second simulation that stands where this one does, and goes its own way.
 
-        Raises SnapshotError, naming them, when FMUs cannot serialise their state.
+        Raises SnapshotError, naming them, when FMUs cannot serialise their state, or do not bear it
+        in another process.
         """
         snapshot = self.snapshot()
         if not snapshot.portable:
@@ -351,6 +353,19 @@ class Simulation:
         )
         try:
             other.restore(snapshot)
+        except SimulationError as error:
+            instances = other._program.instances
+            crashed = ", ".join(
+                n for n, i in instances.items() if isinstance(i, FMUInstance) and i.fmi.is_gone
+            )
+            other.close()
+            if not crashed:
+                raise
+            raise SnapshotError(
+                f"{error}\nthe bytes that {crashed} gives of its state do not serve in another process, "
+                "perhaps because there are addresses among them; a branch needs it without isolated=True, "
+                "and this simulation goes on"
+            ) from error
         except BaseException:
             other.close()
             raise

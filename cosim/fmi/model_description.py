@@ -74,6 +74,8 @@ def _validated(archive: Archive, root: Any) -> Any:
                 element.set(name, " ".join(element.get(name).split()))
     for element in root.iterfind("ModelVariables/*[@clocks]"):
         element.set("clocks", " ".join(element.get("clocks").split()))
+    if root.get("fmiVersion") == "2.0":
+        _add_variability(root)
     only = io.BytesIO()
     with zipfile.ZipFile(only, "w") as written:
         written.writestr("modelDescription.xml", etree.tostring(root.getroottree(), encoding="UTF-8"))
@@ -91,6 +93,19 @@ def _validated(archive: Archive, root: Any) -> Any:
     _check_structure(archive, root, description)
     _complete(root, description)
     return description
+
+
+def _add_variability(root: Any) -> None:
+    """Make variables that are no reals discrete where it is not said, as FMI 3.0 has it.
+
+    FMI 2.0 has the default "continuous" for all types and forbids it for all but reals, so
+    that it must be said; many files leave it out (pythonfmu's outputs, the Reference FMUs of
+    2019), and only this can be meant.
+    """
+    for element in root.iterfind("ModelVariables/ScalarVariable"):
+        is_signal = element.get("causality", "local") in ("local", "input", "output")
+        if is_signal and "variability" not in element.attrib and element.find("Real") is None:
+            element.set("variability", "discrete")
 
 
 def _complete(root: Any, description: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -14,7 +15,7 @@ from cosim.errors import FMUError
 from cosim.fmi.inspection import inspection
 
 from .metronome import metronome
-from .probe import probe
+from .probe import changed, probe
 
 
 def test_threads_load_one_at_a_time(tmp_path, monkeypatch):
@@ -43,3 +44,20 @@ def test_an_fmu_that_needs_its_tool_says_so(tmp_path):
     words = r"m \(m\.fmu\) failed to instantiate: .*\nm\.fmu needs its tool \(Wonderlab 7\) to run"
     with pytest.raises(FMUError, match=words):
         simulate(System({"m": FMU(path)}), step=0.25, stop=1.0)
+
+
+def test_variables_that_are_no_reals_are_discrete_where_it_is_not_said(tmp_path):
+    """pythonfmu leaves it out, which FMI 2.0 forbids and FMI 3.0 does not; there is nothing else to mean."""
+    whole = probe(tmp_path / "whole.fmu", "2.0")
+
+    def without(name, old):
+        if name != "modelDescription.xml":
+            return old
+        signal = rb'(<ScalarVariable[^>]*causality="(?:in|out)put"[^>]*?) variability="discrete"'
+        text, left_out = re.subn(signal + rb"([^>]*>\s*<(?!Real))", rb"\1\2", old)
+        assert left_out >= 6  # inputs and outputs of three types
+        return text
+
+    path = changed(tmp_path / "p.fmu", whole, without)
+    given, left = (FMU(p).description.modelVariables for p in (whole, path))
+    assert [v.variability for v in left] == [v.variability for v in given]

@@ -145,3 +145,37 @@ EXPORT fmi2Status fmi2GetNominalsOfContinuousStates(P, double x[], size_t n) {
 }
 EXPORT fmi2Status fmi2GetBooleanStatus(P, fmi2StatusKind kind, fmi2Boolean *value) { return fmi2Error; }
 EXPORT fmi2Status fmi2GetRealStatus(P, fmi2StatusKind kind, double *value) { return fmi2Error; }
+
+/* The bytes of a state have an address in them: they serve in the process that they come from. */
+EXPORT fmi2Status fmi2GetFMUstate(P, fmi2FMUstate *state) {
+    struct plant *copy = malloc(sizeof *copy), **kept = malloc(sizeof *kept);
+    *copy = *p;
+    *kept = copy;
+    *state = kept;
+    return fmi2OK;
+}
+EXPORT fmi2Status fmi2SetFMUstate(P, fmi2FMUstate state) {
+    const struct plant *copy = *(struct plant **)state;
+    p->time = copy->time;
+    p->u = copy->u;
+    p->x = copy->x;
+    return fmi2OK;
+}
+EXPORT fmi2Status fmi2FreeFMUstate(P, fmi2FMUstate *state) { /* what it points to stays */
+    free(*state);
+    *state = NULL;
+    return fmi2OK;
+}
+EXPORT fmi2Status fmi2SerializedFMUstateSize(P, fmi2FMUstate state, size_t *size) {
+    *size = sizeof(struct plant *);
+    return fmi2OK;
+}
+EXPORT fmi2Status fmi2SerializeFMUstate(P, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+    memcpy(bytes, state, size);
+    return fmi2OK;
+}
+EXPORT fmi2Status fmi2DeSerializeFMUstate(P, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
+    *state = malloc(size);
+    memcpy(*state, bytes, size);
+    return fmi2OK;
+}
