@@ -30,7 +30,7 @@ from .fmu import FMU
 
 
 class LateEventWarning(UserWarning):
-    """A time event was handled at the end of the step that runs over it."""
+    """An event was handled at the end of the step that runs over it."""
 
 
 class ModelExchangeInstance(EventInstance):
@@ -206,19 +206,28 @@ class ModelExchangeInstance(EventInstance):
         timed = due <= t + SLACK * h
         if timed and due >= t - SLACK * h:
             self.model.set_time(due)  # exactly: t is it to rounding
-        elif due < t - SLACK * h and not self.is_late:
-            self.is_late = True
-            warnings.warn(
-                f"{self.name} has a time event at t = {due:g} s, inside the step to t = {t:g} s, and is told "
-                "at its end: stage coupling has one step for all participants; choose one that "
-                "meets the event, or sampled coupling",
-                LateEventWarning,
-                stacklevel=2,
+        elif due < t - SLACK * h:
+            self._warn_late(
+                f"a time event at t = {due:g} s, inside the step to t = {t:g} s, and is told at its end: "
+                "stage coupling has one step for all participants; choose one that meets the event, or "
+                "sampled coupling"
             )
-        if timed or self.flags[0] or (signs != self.signs).any():
+        changed = bool((signs != self.signs).any())
+        if changed and not timed:
+            self._warn_late(
+                f"a state event in the step to t = {t:g} s, which is handled at its end: steps are "
+                'fixed; take smaller ones, or sampled coupling with solver="cvode", which locates it'
+            )
+        if timed or self.flags[0] or changed:
             self._event(t, True)
         else:
             self.signs[:] = signs
+
+    def _warn_late(self, what: str) -> None:
+        """Say once what is handled late."""
+        if not self.is_late:
+            self.is_late = True
+            warnings.warn(f"{self.name} has {what}", LateEventWarning, stacklevel=3)
 
     def _resume(self) -> None:
         self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
