@@ -214,6 +214,14 @@ class _Writer:
         typed = ", ".join(f"{kind} {a}" for kind, a in zip(kinds.split(), arguments, strict=True))
         return self.value(f"call i32 {function}({typed})")
 
+    def call_back(self, word: int, t: str, h: str) -> None:
+        """Call the callback in an operand of the row, with t and h; go on if it did not fail."""
+        self.check_status(self.value(f"call i32 {self.word(word)}(ptr null, double {t}, double {h})"))
+
+    def check_status(self, status: str) -> None:
+        """Go on if the i32 status of a kernel or callback is 0."""
+        self.check(self.value(f"sext i32 {status} to i64"))
+
 
 # ------------------------------------------------------------------------------ operations
 
@@ -236,7 +244,7 @@ def _copy(w: _Writer, op: Op) -> None:
 
 def _call(w: _Writer, op: Op) -> None:
     status = w.call("ptr double double", w.word(1), w.time(op.fraction), w.step(op))
-    w.check(w.value(f"sext i32 {status} to i64"))
+    w.check_status(status)
     w.check_finite(w.word(2), op.n)
 
 
@@ -316,8 +324,7 @@ def _fmi2_do_step(w: _Writer, op: Op) -> None:
     discarded, judged, on = (w.label() for _ in range(3))
     w.lines.append(f"  br i1 {w.value(f'icmp eq i32 {status}, 2')}, label %{discarded}, label %{judged}")
     w.start_block(discarded)
-    answer = w.value(f"call i32 {w.word(4)}(ptr null, double {t}, double {h})")
-    w.check(w.value(f"sext i32 {answer} to i64"))
+    w.call_back(4, t, h)
     w.lines.append(f"  br label %{on}")
     w.start_block(judged)
     w.check_fmi(status)
@@ -329,7 +336,7 @@ def _fmi3_do_step(w: _Writer, op: Op) -> None:
     flags, times = w.word(2), w.word(3)
     event, terminate, early = (w.value(f"getelementptr i8, ptr {flags}, i64 {i}") for i in range(3))
     t, h = w.time(op.fraction), w.step(op)
-    end = w.value(f"fadd double {t}, {w.value(f'fmul double {h}, {number(1.0 + 1e-9)}')}")
+    end = w.value(f"fadd double {t}, {w.value(f'fmul double {h}, {number(1.0 + SLACK)}')}")
     due = w.value(f"fcmp ole double {w.load(w.at(times, 1))}, {end}")
     split, whole, interrupted, on = (w.label() for _ in range(4))
     w.lines.append(f"  br i1 {due}, label %{split}, label %{whole}")
@@ -345,8 +352,7 @@ def _fmi3_do_step(w: _Writer, op: Op) -> None:
     asked = w.value(f"icmp ne i8 {any_flag}, 0")
     w.lines.append(f"  br i1 {asked}, label %{interrupted}, label %{on}")
     w.start_block(interrupted)
-    status = w.value(f"call i32 {w.word(4)}(ptr null, double {t}, double {h})")
-    w.check(w.value(f"sext i32 {status} to i64"))
+    w.call_back(4, t, h)
     w.lines.append(f"  br label %{on}")
     w.start_block(on)
 
@@ -374,8 +380,7 @@ def _fmi_completed(w: _Writer, op: Op) -> None:
     handle, on = w.label(), w.label()
     w.lines.append(f"  br i1 {w.value(f'or i1 {due}, {asked}')}, label %{handle}, label %{on}")
     w.start_block(handle)
-    status = w.value(f"call i32 {w.word(3)}(ptr null, double {t}, double %h)")
-    w.check(w.value(f"sext i32 {status} to i64"))
+    w.call_back(3, t, "%h")
     w.lines.append(f"  br label %{on}")
     w.start_block(on)
 
@@ -386,8 +391,7 @@ def _unless_event(w: _Writer, op: Op) -> None:
     inside, split, on = w.label(), w.label(), w.label()
     w.lines.append(f"  br i1 {due}, label %{split}, label %{inside}")
     w.start_block(split)
-    status = w.value(f"call i32 {w.word(3)}(ptr null, double {w.time(0.0)}, double %h)")
-    w.check(w.value(f"sext i32 {status} to i64"))
+    w.call_back(3, w.time(0.0), "%h")
     w.lines.append(f"  br label %{on}")
     w.start_block(inside)
     w.ends.append(on)
