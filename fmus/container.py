@@ -92,11 +92,7 @@ def export_container(
     files = _build(
         wired, parts, order, target.stem, DefaultExperiment(start, stop or start + 1000 * step, step)
     )
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_archive(target, files)
-    except OSError as error:
-        raise ExportError(f"{target} cannot be written: {error.strerror}") from error
+    write_archive(target, files)
     return target
 
 

@@ -14,6 +14,7 @@ import struct
 import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from cosim.c_compiler import Platform, host
@@ -74,11 +75,7 @@ def export(
         write_archive(trial, files | _binaries(name, {here: libraries[here]}, fmi_version))
         files |= reference_files(trial, participant, plan, offered)
     files |= _binaries(name, {p: libraries[p] for p in wanted}, fmi_version)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_archive(target, files)
-    except OSError as error:
-        raise ExportError(f"{target} cannot be written: {error.strerror}") from error
+    write_archive(target, files)
     return target
 
 
@@ -120,9 +117,13 @@ def _default_experiment(participant: Participant) -> DefaultExperiment:
 
 
 def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDescription.xml") -> None:
-    """Write a zip archive whose bytes depend on its contents only; whoever looks sees all of it."""
+    """Write a zip archive whose bytes depend on its contents only; whoever looks sees all of it.
+
+    Makes its folder. Raises ExportError when it cannot be written.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
             for name in [first, *sorted(files.keys() - {first})]:
                 entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
@@ -131,8 +132,11 @@ def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDes
                 entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
                 archive.writestr(entry, files[name])
         os.replace(temporary, path)
+    except OSError as error:
+        raise ExportError(f"{path} cannot be written: {error.strerror}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _binaries(name: str, libraries: Mapping[Platform, bytes], fmi_version: str) -> dict[str, bytes]:

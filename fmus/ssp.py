@@ -47,7 +47,6 @@ from cosim.ssp.format import (
 from cosim.system import Connection, Member, Port, System
 
 from .export import write_archive
-from .link import ExportError
 from .parts import Part, fmu_parts
 
 PARAMETER_SET = "parameters"  # one name for all: tools apply sets by name
@@ -97,11 +96,7 @@ def export_ssp(
     facts = {name: value for name, value in asked.items() if value is not None}
     text = writer.document(target.stem, start, stop, facts)
     files = {f"resources/{part.source}": part.file for part in parts.values()}
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_archive(target, {ROOT: text, **files}, first=ROOT)
-    except OSError as error:
-        raise ExportError(f"{target} cannot be written: {error.strerror}") from error
+    write_archive(target, {ROOT: text, **files}, first=ROOT)
     return target
 
 
