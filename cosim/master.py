@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable
 
 from .program import Program
 from .result import Result
-from .simulation import Coupling, Simulation, Solver, check_choices, check_stop, check_system, check_time
+from .run_options import Coupling, Solver, check_choices, check_stop, check_system, check_time
+from .simulation import Simulation
 from .system import System
 from .time_grid import steps_between
 

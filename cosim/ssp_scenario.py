@@ -9,8 +9,8 @@ from typing import Any, get_args
 from .errors import did_you_mean
 from .master import simulate
 from .result import Result
+from .run_options import Coupling, Solver
 from .scenario import Scenario, ScenarioError, find_part
-from .simulation import Coupling, Solver
 from .ssp.reader import Package, read_package
 from .system import System
 

@@ -182,9 +182,7 @@ class _Writer:
             notes = _add(component, SSD, "Annotations")
             _annotate(notes, "participant", facts)
             if "samplePeriod" in facts:
-                note = _add(notes, SSC, "Annotation", type=_OSP[0])
-                hint = etree.SubElement(note, f"{{{_OSP[1]}}}StepSizeHint")
-                hint.set("value", facts["samplePeriod"])
+                _osp_note(notes, "StepSizeHint").set("value", facts["samplePeriod"])
 
     def _connectors(self, part: Part) -> dict[str, tuple[FMUPort, str]]:
         """Return all outputs, and the inputs and local variables that are connected."""
@@ -314,14 +312,18 @@ class _Writer:
             notes = _add(experiment, SSD, "Annotations")
             _annotate(notes, "experiment", facts)
         if "step" in facts:
-            note = _add(notes, SSC, "Annotation", type=_OSP[0])
-            algorithm = etree.SubElement(note, f"{{{_OSP[1]}}}Algorithm")
+            algorithm = _osp_note(notes, "Algorithm")
             fixed = etree.SubElement(algorithm, f"{{{_OSP[1]}}}FixedStepAlgorithm")
             fixed.set("baseStepSize", facts["step"])
 
 
 def _add(parent: etree._Element, prefix: str, element: str, /, **attributes: str) -> etree._Element:
     return etree.SubElement(parent, tag(prefix, element), attributes)
+
+
+def _osp_note(notes: Any, tag: str) -> Any:
+    """Add an annotation of the Open Simulation Platform, which ecos and libcosim read."""
+    return etree.SubElement(_add(notes, SSC, "Annotation", type=_OSP[0]), f"{{{_OSP[1]}}}{tag}")
 
 
 def _annotate(notes: etree._Element, name: str, facts: dict[str, str]) -> None:

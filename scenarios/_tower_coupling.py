@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from cosim import Result, System, simulate
-from cosim.simulation import Coupling
+from cosim.run_options import Coupling
 from fmus.cached import as_fmu
 from fmus.damped_tower import DampedTower
 from fmus.modal_structure import ModalStructure
