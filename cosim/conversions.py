@@ -55,7 +55,7 @@ def to_float(kind: Number) -> tuple[str, str]:
             low = 2**53 if kind.low else 0  # what has to be added for the least one to be 0
             check = f"  %shifted = add i64 %v, {low}\n  %fit = icmp ule i64 %shifted, {2**53 + low}"
         convert = f"{'sitofp' if kind.low else 'uitofp'} {kind.llvm} %v to double"
-    name = f"{kind.dtype}_to_float"
+    name = f"{kind.name}_to_float"
     return name, _LOOP.format(name=name, source=kind.llvm, target="double", check=check, convert=convert)
 
 
@@ -78,6 +78,6 @@ def from_float(kind: Number) -> tuple[str, str]:
             "%fit = and i1 %whole, %range",
         ]
         convert = f"{'fptosi' if kind.low else 'fptoui'} double %rounded to {kind.llvm}"
-    name = f"float_to_{kind.dtype}" if kind.high != 1 else f"float_to_boolean_{kind.dtype}"
+    name = f"float_to_{kind.name}"
     check = "\n".join(f"  {line}" for line in lines)
     return name, _LOOP.format(name=name, source="double", target=kind.llvm, check=check, convert=convert)

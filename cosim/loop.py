@@ -173,7 +173,9 @@ class _Writer:
 
     def convert(self, function: tuple[str, str], op: Op) -> None:
         """Call a conversion from a to b, of which the name and the text are given."""
-        name, self.library[name] = function
+        name, text = function
+        if self.library.setdefault(name, text) != text:
+            raise AssertionError(f"internal error: two functions of the loop are named {name}")
         self.check(self.value(f"call i64 @{name}(ptr {self.word(1)}, ptr {self.word(2)}, i64 {op.n})"))
 
     def check(self, status: str) -> None:

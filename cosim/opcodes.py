@@ -40,6 +40,11 @@ class Number:
     high: int = 0
 
     @property
+    def name(self) -> str:
+        """Return a name that carries all fields, fit for a symbol: "int32_m2147483648_2147483647"."""
+        return f"{self.dtype}_{self.low}_{self.high}".replace("-", "m")
+
+    @property
     def is_float(self) -> bool:
         """Tell whether it holds fractions."""
         return self.high == 0

@@ -24,6 +24,8 @@ from cosim import (
 )
 from cosim.errors import CosimError, FMUError, SimulationError, WiringError
 from cosim.fmi.inspection import inspection
+from cosim.loop import _Writer
+from cosim.opcodes import TO_FLOAT, Op
 from fmus.export import export
 
 from ..parts import Counter, Mass, Ramp
@@ -103,6 +105,28 @@ def test_every_type_goes_in_and_out(probes, version, options):
     for name, values in expected.items():
         shifted = [first[name], *values[:-1]] if late else values
         assert list(result[f"p.{name}"]) == list(shifted), name
+
+
+@pytest.mark.parametrize("recorded", [["i", "b"], ["b", "i"]])
+@pytest.mark.parametrize("first", VERSIONS)
+def test_negative_integers_beside_booleans(probes, first, recorded):
+    """Int32 and the Boolean of FMI 2.0 are both C ints; each must keep its own conversion, in any order."""
+    participants = {
+        f"p{v[0]}": FMU(probes[v], start={"i_in": -7.0}) for v in sorted(VERSIONS, key=lambda v: v != first)
+    }
+    record = [f"{p}.{name}_out" for p in participants for name in recorded]
+    result = simulate(System(participants), step=H, stop=2 * H, record=record)
+    for p in participants:
+        assert list(result[f"{p}.i_out"]) == [-6.0] * 3
+        assert list(result[f"{p}.b_out"]) == [0.0] * 3
+
+
+def test_two_functions_of_one_name_are_an_internal_error():
+    """The last text under a name would serve all of its callers."""
+    writer = _Writer()
+    writer.convert(("f", "text"), Op("", TO_FLOAT))
+    with pytest.raises(AssertionError, match="two functions of the loop are named f"):
+        writer.convert(("f", "another text"), Op("", TO_FLOAT))
 
 
 @pytest.mark.parametrize("version", VERSIONS)
