@@ -1,35 +1,65 @@
-"""structcosim's core: blocks, systems, the master, results.
+"""Co-simulation of vibration-controlled structures: blocks, systems, runs, results.
 
 from cosim import Block, Continuous, FMU, Input, Output, Parameter, State, System, simulate
 """
 
-from .errors import CosimError, SimulationEndedWarning
+from .core.participant import Block, Continuous, LinearContinuous, Participant
+from .core.variables import Array, Input, Local, Output, Parameter, State
+from .errors import (
+    CompilationError,
+    CosimError,
+    DeclarationError,
+    FMUError,
+    RecordError,
+    SimulationEndedWarning,
+    SnapshotError,
+    TimeError,
+    WiringError,
+)
 from .fmi.fmu import FMU
-from .master import schedule, simulate
-from .participant import Block, Continuous, LinearContinuous
-from .result import Result
-from .simulation import Interrupted, Simulation, Snapshot
-from .system import System
-from .variables import Array, Input, Local, Output, Parameter, State
+from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
+from .result import Interrupted, Result, SimulationError, Statistics
+from .run.master import schedule, simulate
+from .run.simulation import Simulation, Snapshot
+from .ssp.reader import read_ssp
+from .system.system import System
+
+__version__ = "0.1.0"
 
 __all__ = [
     "FMU",
     "Array",
     "Block",
+    "CompilationError",
     "Continuous",
     "CosimError",
+    "DeclarationError",
+    "FMUError",
+    "GroundMotion",
     "Input",
     "Interrupted",
     "LinearContinuous",
     "Local",
     "Output",
     "Parameter",
+    "Participant",
+    "RecordError",
     "Result",
     "Simulation",
     "SimulationEndedWarning",
+    "SimulationError",
     "Snapshot",
+    "SnapshotError",
     "State",
+    "Statistics",
     "System",
+    "TimeError",
+    "WiringError",
+    "__version__",
+    "el_centro",
+    "read_at2",
+    "read_columns",
+    "read_ssp",
     "schedule",
     "simulate",
 ]

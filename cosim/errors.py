@@ -8,10 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .result import Result
 
 
 class CosimError(Exception):
@@ -48,12 +44,6 @@ class SnapshotError(CosimError):
 
 class SimulationEndedWarning(UserWarning):
     """A participant asked to end the run before its stop time: a normal end; see `Result.ended`."""
-
-
-class SimulationError(CosimError):
-    """A run that had to stop. What was computed until then is in `result`."""
-
-    result: Result | None = None
 
 
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from .variables import Array
+from .core.variables import Array
 
 
 def sign(x: float) -> float:

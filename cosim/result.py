@@ -11,9 +11,9 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from .errors import RecordError, WiringError, did_you_mean
+from .core.variables import Array
+from .errors import CosimError, RecordError, WiringError, did_you_mean
 from .units import conversion
-from .variables import Array
 
 if TYPE_CHECKING:
     import pandas
@@ -157,3 +157,17 @@ class Result:
         import pandas
 
         return pandas.DataFrame(self.columns(), index=pandas.Index(self.time, name="time"))
+
+
+class SimulationError(CosimError):
+    """A run that had to stop; `result` holds what was computed until then."""
+
+    result: Result | None = None
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a run; `result` holds what was computed until then."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__(f"interrupted at t = {result.time[-1] if len(result.time) else 0.0:g} s")
+        self.result = result

@@ -1,1 +1,1 @@
-"""Structural plants, and the way from a participant to an .fmu file."""
+"""Structural models, plants, elements and loads, and their export as FMUs."""

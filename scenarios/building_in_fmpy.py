@@ -42,10 +42,10 @@ def shake(path: str) -> list[float]:
 
 def build() -> Any:
     """Return the same as a system of ours; `building` in it is what `cosim export` takes."""
-    from controllers.viscous_dampers import ViscousDampers
+    from controllers.laws.viscous_dampers import ViscousDampers
     from cosim import System
     from cosim.blocks import function_source
-    from fmus.shear_building import ShearBuilding
+    from fmus.plants.shear_building import ShearBuilding
 
     plant = ShearBuilding.with_modal_damping([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
     members = {"building": plant, "ground": function_source(ground), "damper": ViscousDampers(c=DAMPING, p=1)}

@@ -17,11 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim import Block, Input, Output, Parameter, Result, System, simulate
+from cosim import Block, Input, Output, Parameter, Result, System, read_ssp, simulate
 from cosim.blocks import function_source
-from cosim.ssp import read_ssp
-from fmus.shear_building import ShearBuilding
-from fmus.ssp import PARAMETER_SET, export_ssp
+from fmus.packaging.ssp import PARAMETER_SET, export_ssp
+from fmus.plants.shear_building import ShearBuilding
 
 STEP, STOP = 0.01, 10.0
 

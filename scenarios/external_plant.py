@@ -11,10 +11,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from cosim import FMU, Block, Input, Output, Parameter, Result, System, simulate
-from cosim.fmu_scenario import start_values
+from cosim.cli.fmu_scenario import start_values
 from cosim.functions import clip
-from fmus.cached import as_fmu
-from fmus.oscillator import Oscillator
+from fmus.export import as_fmu
+from fmus.plants.oscillator import Oscillator
 
 
 class Damping(Block):

@@ -1,9 +1,9 @@
 """The conformance table: what of FMI 2.0 and 3.0 is there, which FMU exercises it, which test shows it.
 
-    python -m tests.conformance         prints it as Markdown, as it stands in the README
+    python -m tests.conformance         prints it as Markdown, as it stands in tests/README.md
 
-`test_conformance.py` asserts that the tests exist, run in the ordinary suite, and that the README
-has this very table.
+`test_conformance.py` asserts that the tests exist, run in the ordinary suite, and that
+tests/README.md has this very table.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ PASS, NONE = "pass", "–"
 
 #: where the FMUs come from: name -> file and what it has
 FMUS = {
-    "ours": ("fmus/export.py", "plants and blocks of ours, exported"),
+    "ours": ("fmus/export/fmu.py", "plants and blocks of ours, exported"),
     "probe": ("tests/cosim/fmi/c/probe.h", "C; all types, events, arrays, structural parameters"),
     "ball": ("tests/cosim/fmi/c/ball2.c", "C; Model Exchange with state and time events, failures on demand"),
     "metronome": (
@@ -24,7 +24,7 @@ FMUS = {
     "pythonfmu": ("tests/others.py", "made by pythonfmu 0.7 (FMI 2.0) and pythonfmu3 0.3 (FMI 3.0)"),
     "crash": ("tests/cosim/fmi/c/crash.c", "C; ends its process in any call"),
     "bad": ("tests/cosim/fmi/c/bad.c", "C; good or with one of the faults that the doctor looks for"),
-    "broken": ("tests/cosim/fmi/test_archive.py", "damaged and hostile archives and descriptions"),
+    "broken": ("tests/cosim/fmi/file/test_archive.py", "damaged and hostile archives and descriptions"),
 }
 
 
@@ -48,11 +48,11 @@ def only3(feature: str, fmus: str, tests: list[str], note: str = "") -> Row:
     return Row(feature, NONE, PASS, fmus, tests, note)
 
 
-F3, ME = "cosim/fmi/test_fmu3.py", "cosim/fmi/test_model_exchange.py"
-EVENTS, STATES = "cosim/fmi/test_co_simulation_events.py", "cosim/test_simulation.py"
+F3, ME = "cosim/fmi/test_fmi3.py", "cosim/fmi/instance/test_model_exchange.py"
+EVENTS, STATES = "cosim/fmi/instance/test_co_simulation_events.py", "cosim/run/test_simulation.py"
 
-ISOLATED, EXAMPLES = "cosim/fmi/test_isolation.py", "scenarios/test_examples.py"
-UNITS, DOCTOR = "cosim/fmi/test_start_units.py", "cosim/test_doctor.py"
+ISOLATED, EXAMPLES = "cosim/fmi/isolation/test_isolation.py", "scenarios/test_examples.py"
+UNITS, DOCTOR = "cosim/fmi/file/test_display_units.py", "cosim/doctor/test_examination.py"
 
 TABLE: dict[str, list[Row]] = {
     "In": [
@@ -107,7 +107,7 @@ TABLE: dict[str, list[Row]] = {
             "probe, metronome",
             [
                 f"{F3}::test_units_strings_and_dependencies",
-                "cosim/fmi/test_text_ports.py::test_texts_of_both_versions",
+                "cosim/system/test_text_ports.py::test_texts_of_both_versions",
             ],
         ),
         only3(
@@ -115,7 +115,7 @@ TABLE: dict[str, list[Row]] = {
             "probe, metronome",
             [
                 f"{F3}::test_binary_start_values",
-                "cosim/fmi/test_text_ports.py::test_texts_go_from_fmu_to_fmu",
+                "cosim/system/test_text_ports.py::test_texts_go_from_fmu_to_fmu",
             ],
         ),
         only3(
@@ -148,7 +148,7 @@ TABLE: dict[str, list[Row]] = {
         both(
             "instances of one FMU share an extraction",
             "ours",
-            ["cosim/fmi/test_archive.py::test_fmus_of_one_file_share_a_folder_while_there_is_one"],
+            ["cosim/fmi/file/test_archive.py::test_fmus_of_one_file_share_a_folder_while_there_is_one"],
         ),
         both(
             "start values and parameters by name",
@@ -161,7 +161,10 @@ TABLE: dict[str, list[Row]] = {
         both(
             "units, converted on connections",
             "probe",
-            [f"{F3}::test_units_strings_and_dependencies", "cosim/test_wiring.py::test_units_are_converted"],
+            [
+                f"{F3}::test_units_strings_and_dependencies",
+                "cosim/system/test_system.py::test_units_are_converted",
+            ],
         ),
         both(
             "display units; start values with units",
@@ -189,8 +192,8 @@ TABLE: dict[str, list[Row]] = {
             "damaged and hostile archives are an error",
             "broken",
             [
-                "cosim/fmi/test_archive.py::test_a_path_out_of_the_folder",
-                "cosim/fmi/test_fuzzed_fmu.py::test_changed_archives",
+                "cosim/fmi/file/test_archive.py::test_a_path_out_of_the_folder",
+                "cosim/fmi/file/test_fuzzed_fmu.py::test_changed_archives",
             ],
         ),
         Row("Scheduled Execution", NONE, "no", "", [], "a master with fixed steps has no scheduler to offer"),
@@ -209,53 +212,53 @@ TABLE: dict[str, list[Row]] = {
             "every block and plant; no finding of FMPy and fmutool; the same bits in our loop",
             "ours",
             [
-                "fmus/test_every_class.py::test_every_class_can_be_made",
-                "fmus/test_every_class.py::test_a_class_leaves",
+                "fmus/export/test_every_class.py::test_every_class_can_be_made",
+                "fmus/export/test_every_class.py::test_a_class_leaves",
             ],
             "versions in turn; each class in both under the marker `long`",
         ),
         both(
             "controllers and plants close the loop in FMPy",
             "ours",
-            ["fmus/test_controllers_elsewhere.py::test_a_loop_of_fmpys_calls_closes_the_loop"],
+            ["fmus/export/test_controllers_elsewhere.py::test_a_loop_of_fmpys_calls_closes_the_loop"],
         ),
         both(
             "and in ecos",
             "ours",
-            ["fmus/test_controllers_elsewhere.py::test_ecos_closes_the_loop"],
+            ["fmus/export/test_controllers_elsewhere.py::test_ecos_closes_the_loop"],
             "FMI 3.0: scalars, ecos has no arrays",
         ),
         only3(
             "arrays as arrays",
             "ours",
             [
-                "fmus/test_fmu3.py::test_arrays_are_arrays",
-                "fmus/test_fmu3.py::test_values_go_in_and_out_as_arrays",
+                "fmus/export/test_fmi3.py::test_arrays_are_arrays",
+                "fmus/export/test_fmi3.py::test_values_go_in_and_out_as_arrays",
             ],
         ),
         both(
             "Co-Simulation with any step, Model Exchange",
             "ours",
             [
-                "fmus/test_fmu_trajectories.py::test_steps_of_any_length_are_exact",
-                "fmus/test_fmu_trajectories.py::test_model_exchange_in_fmpy",
-                "fmus/test_fmu3.py::test_model_exchange_in_fmpy",
+                "fmus/export/test_trajectories.py::test_steps_of_any_length_are_exact",
+                "fmus/export/test_trajectories.py::test_model_exchange_in_fmpy",
+                "fmus/export/test_fmi3.py::test_model_exchange_in_fmpy",
             ],
         ),
         both(
             "state: get, set, serialise",
             "ours",
             [
-                "fmus/test_fmu_state.py::test_a_restored_state_continues_bit_for_bit",
-                "fmus/test_fmu3.py::test_a_state_as_bytes_in_another_instance",
+                "fmus/export/test_state.py::test_a_restored_state_continues_bit_for_bit",
+                "fmus/export/test_fmi3.py::test_a_state_as_bytes_in_another_instance",
             ],
         ),
         both(
             "reset; many instances",
             "ours",
             [
-                "fmus/test_fmu_state.py::test_reset_repeats_the_run_bit_for_bit",
-                "fmus/test_fmu_state.py::test_cycles_do_not_grow",
+                "fmus/export/test_state.py::test_reset_repeats_the_run_bit_for_bit",
+                "fmus/export/test_state.py::test_cycles_do_not_grow",
                 "test_conformance.py::test_reset_and_many_instances",
             ],
         ),
@@ -263,16 +266,16 @@ TABLE: dict[str, list[Row]] = {
             "directional derivatives",
             "ours",
             [
-                "fmus/test_fmu_trajectories.py::test_directional_derivatives_of_a_linear_plant",
-                "fmus/test_fmu3.py::test_directional_derivatives_by_arrays",
+                "fmus/export/test_trajectories.py::test_directional_derivatives_of_a_linear_plant",
+                "fmus/export/test_fmi3.py::test_directional_derivatives_by_arrays",
             ],
         ),
         both(
             "dependencies, exact; units",
             "ours",
             [
-                "fmus/test_fmu_validity.py::test_dependencies_are_exact_by_element",
-                "fmus/test_fmu_validity.py::test_every_variable_with_a_unit_has_it_defined_in_base_units",
+                "fmus/export/test_validity.py::test_dependencies_are_exact_by_element",
+                "fmus/export/test_validity.py::test_every_variable_with_a_unit_has_it_defined_in_base_units",
                 "test_conformance.py::test_the_structure_is_the_same_in_both_versions",
             ],
         ),
@@ -280,31 +283,31 @@ TABLE: dict[str, list[Row]] = {
             "misuse is an error with a reason",
             "ours",
             [
-                "fmus/test_fmu_misuse.py::test_misuse_is_an_error_with_a_reason_and_changes_nothing",
-                "fmus/test_fmu3.py::test_misuse_is_an_error_with_a_reason",
+                "fmus/export/test_misuse.py::test_misuse_is_an_error_with_a_reason_and_changes_nothing",
+                "fmus/export/test_fmi3.py::test_misuse_is_an_error_with_a_reason",
             ],
         ),
         both(
             "reference result (FMI-LS-REF)",
             "ours",
             [
-                "fmus/test_fmu_validity.py::test_the_reference_result_is_what_fmpy_simulates",
-                "fmus/test_fmu_validity.py::test_both_versions_of_fmi_compute_the_same_bits",
+                "fmus/export/test_validity.py::test_the_reference_result_is_what_fmpy_simulates",
+                "fmus/export/test_validity.py::test_both_versions_of_fmi_compute_the_same_bits",
             ],
         ),
         both(
             "for Linux and macOS from any machine",
             "ours",
             [
-                "fmus/test_fmu_link.py::test_linux",
-                "fmus/test_fmu_link.py::test_macos_is_one_universal_library",
-                "fmus/test_fmu3.py::test_every_platform_has_its_folder",
+                "fmus/export/test_link.py::test_linux",
+                "fmus/export/test_link.py::test_macos_is_one_universal_library",
+                "fmus/export/test_fmi3.py::test_every_platform_has_its_folder",
             ],
         ),
         both(
             "for Windows from any machine",
             "ours",
-            ["fmus/test_fmu_link.py::test_windows"],
+            ["fmus/export/test_link.py::test_windows"],
             "`-m long`: the first link takes a minute",
         ),
         Row(
@@ -321,14 +324,14 @@ TABLE: dict[str, list[Row]] = {
             "SSP 1.0 and 2.0 out and in: connections, parameters, units",
             "ours",
             [
-                "fmus/test_ssp.py::test_the_same_bits_after_the_way_through_a_file",
+                "fmus/packaging/test_ssp.py::test_the_same_bits_after_the_way_through_a_file",
                 "cosim/ssp/test_ssp.py::test_values_come_from_files_through_mappings_and_prefixes",
             ],
         ),
         both(
             "a Python block in the place of a component",
             "ours",
-            ["fmus/test_ssp.py::test_a_python_block_in_place_of_a_component"],
+            ["fmus/packaging/test_ssp.py::test_a_python_block_in_place_of_a_component"],
         ),
         Row(
             "an SSP of ours in ecos, libcosim and FMPy",
@@ -336,22 +339,22 @@ TABLE: dict[str, list[Row]] = {
             PASS,
             "ours",
             [
-                "fmus/test_ssp_elsewhere.py::test_the_same_numbers_elsewhere",
-                "fmus/test_ssp_elsewhere.py::test_fmus_of_version_3_in_ecos",
+                "fmus/packaging/test_ssp_elsewhere.py::test_the_same_numbers_elsewhere",
+                "fmus/packaging/test_ssp_elsewhere.py::test_fmus_of_version_3_in_ecos",
             ],
             "SSP 1.0; FMI 3.0 in ecos; these tools have no arrays",
         ),
         both(
             "a whole system as one FMU",
             "ours",
-            ["fmus/test_container.py::test_the_same_bits_as_the_system"],
+            ["fmus/packaging/test_container.py::test_the_same_bits_as_the_system"],
         ),
         both(
             "`cosim run loop.ssp`, with Python blocks named on the command line",
             "ours",
             [
-                "cosim/test_system_files.py::test_a_file_runs_as_its_scenario_does",
-                "cosim/test_system_files.py::test_a_controller_from_the_command_line",
+                "cosim/cli/test_ssp_scenario.py::test_a_file_runs_as_its_scenario_does",
+                "cosim/cli/test_ssp_scenario.py::test_a_controller_from_the_command_line",
             ],
         ),
     ],
@@ -360,21 +363,23 @@ TABLE: dict[str, list[Row]] = {
             "force and motion by Newton, with rollback",
             "ours",
             [
-                "cosim/test_iterated.py::test_fmus_give_what_python_gives",
-                "cosim/test_iterated.py::test_what_is_exchanged_agrees_at_every_communication_point",
+                "cosim/run/coupling/test_iterated.py::test_fmus_give_what_python_gives",
+                "cosim/run/coupling/test_iterated.py::test_what_is_exchanged_agrees_at_every_communication_point",
             ],
         ),
         both(
             "the delay of plain coupling, measured",
             "ours",
             [
-                "cosim/test_iterated.py::test_the_delay_of_plain_coupling_is_of_first_order_and_iterated_coupling_of_second"
+                "cosim/run/coupling/test_iterated.py::test_the_delay_of_plain_coupling_is_of_first_order_and_iterated_coupling_of_second"
             ],
         ),
         both(
             "loud when it does not converge",
             "ours",
-            ["cosim/test_iterated.py::test_a_coupling_without_solution_ends_the_run_with_what_was_computed"],
+            [
+                "cosim/run/coupling/test_iterated.py::test_a_coupling_without_solution_ends_the_run_with_what_was_computed"
+            ],
         ),
     ],
     "Doctor": [
@@ -461,7 +466,7 @@ def rows() -> list[Row]:
 
 
 def markdown() -> str:
-    """The table as it stands in the README."""
+    """The table as it stands in tests/README.md, where links are relative to tests/."""
     lines = []
     for group, listed in TABLE.items():
         lines += [f"| **{group}** | FMI 2.0 | FMI 3.0 | FMU | test |", "|---|---|---|---|---|"]
@@ -469,13 +474,13 @@ def markdown() -> str:
             note = f" ({row.note})" if row.note else ""
             tests = ", ".join(
                 f"[{name.partition('::')[2].removeprefix('test_')}]({name.partition('::')[0]})"
-                for name in cited(row)
+                for name in row.tests
             )
             lines.append(
                 f"| {row.feature}{note} | {row.fmi2} | {row.fmi3} | {row.fmus or NONE} | {tests or NONE} |"
             )
         lines.append("")
-    lines += [f"- `{name}`: [{place}]({place}), {what}" for name, (place, what) in FMUS.items()]
+    lines += [f"- `{name}`: [{place}](../{place}), {what}" for name, (place, what) in FMUS.items()]
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""The conformance table says what is so: its tests exist and run, its FMUs are there, the README has it."""
+"""The conformance table is true: its tests exist and run, and tests/README.md has it."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 
-from cosim import FMU, Block, Input, System, simulate
-from cosim.app import main
+from cosim import FMU, Block, Input, SimulationError, System, simulate
 from cosim.blocks import function_source
-from cosim.errors import SimulationError
+from cosim.cli.app import main
 from fmus.export import export
-from fmus.oscillator import Oscillator
+from fmus.plants.oscillator import Oscillator
 from tests.conformance import FMUS, NONE, PASS, TABLE, Row, cited, markdown, rows
+from tests.cosim.fmi.isolation.test_isolation import children
 from tests.cosim.fmi.probe import probe
-from tests.cosim.fmi.test_isolation import children
-from tests.fmus.host import building
+from tests.fmus.export.host import building
 from tests.others import swing
 
 ROOT = Path(__file__).parents[1]
@@ -67,8 +66,8 @@ def test_features_are_named_once() -> None:
 
 
 def test_the_readme_has_this_table() -> None:
-    section = (ROOT / "README.md").read_text().split("## Conformance\n")[1].split("\n## ")[0]
-    assert markdown() in section, "run python -m tests.conformance and put what it prints into the README"
+    section = (ROOT / "tests" / "README.md").read_text().split("## Conformance\n")[1].split("\n## ")[0]
+    assert markdown() in section, "update tests/README.md with what python -m tests.conformance prints"
     for row in rows():
         for name in cited(row):
             assert (ROOT / name.partition("::")[0]).is_file()

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from ..core.participant import Block, Continuous
+from ..core.variables import Array, Input, Output, Parameter, State
 from ..functions import clip
-from ..participant import Block, Continuous
-from ..variables import Array, Input, Output, Parameter, State
-from .ports import length, set_unit
+from .checks import length, set_unit
 
 
 class Saturation(Block):

@@ -6,10 +6,10 @@ import math
 
 from numpy.typing import ArrayLike
 
+from ..core.participant import Block
+from ..core.variables import Input, Output, Parameter
 from ..functions import clip
-from ..participant import Block
-from ..variables import Input, Output, Parameter
-from .ports import length, set_unit, whole
+from .checks import length, set_unit, whole
 
 
 class AnalogToDigital(Block):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from ..participant import Block
-from ..variables import Input, Local, Output, Parameter
-from .ports import length, set_unit, whole
+from ..core.participant import Block
+from ..core.variables import Input, Local, Output, Parameter
+from .checks import length, set_unit, whole
 
 
 class Delay(Block):

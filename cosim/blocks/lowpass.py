@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from ..participant import Block, Continuous
-from ..variables import Array, Input, Local, Output, Parameter, State
-from .ports import length, set_unit
+from ..core.participant import Block, Continuous
+from ..core.variables import Array, Input, Local, Output, Parameter, State
+from .checks import length, set_unit
 
 
 class LowPass(Continuous):

@@ -6,9 +6,9 @@ import math
 
 from numpy.typing import ArrayLike
 
-from ..participant import Block
-from ..variables import Input, Local, Output, Parameter
-from .ports import length, set_unit, whole
+from ..core.participant import Block
+from ..core.variables import Input, Local, Output, Parameter
+from .checks import length, set_unit, whole
 from .random_stream import normal, seed_streams
 
 

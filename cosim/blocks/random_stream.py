@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from ..variables import Array
+from ..core.variables import Array
 
 M1 = 4294967087.0
 M2 = 4294944443.0

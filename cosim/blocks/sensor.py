@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.participant import Continuous, LinearContinuous
+from ..core.variables import Array, Input, Local, Output, Parameter, State
 from ..errors import DeclarationError
 from ..functions import dot
-from ..participant import Continuous, LinearContinuous
-from ..variables import Array, Input, Local, Output, Parameter, State
-from .ports import length, set_unit
+from .checks import length, set_unit
 
 
 class SensorDynamics(Continuous):

@@ -10,11 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.participant import Block
+from ..core.variables import Local, Output, Parameter
 from ..errors import DeclarationError, did_you_mean
-from ..participant import Block
-from ..records import Record
-from ..variables import Local, Output, Parameter
-from .ports import length, set_unit, whole
+from ..ground_motion.ground_motion import GroundMotion
+from .checks import length, set_unit, whole
 from .random_stream import normal, seed_streams
 
 
@@ -55,7 +55,7 @@ class RecordSource(Block):
 
     def __init__(
         self,
-        record: Record | ArrayLike,
+        record: GroundMotion | ArrayLike,
         dt: float | None = None,
         *,
         interpolation: Literal["linear", "hold"] = "linear",
@@ -65,11 +65,11 @@ class RecordSource(Block):
         every: int | None = None,
         sample_period: float | None = None,
     ) -> None:
-        """Take a Record (its dt, unit and start), or values with dt and unit."""
+        """Take a GroundMotion (its dt, unit and start), or values with dt and unit."""
         if interpolation not in ("linear", "hold"):
             hint = did_you_mean(str(interpolation), ["linear", "hold"])
             raise DeclarationError(f"RecordSource: interpolation '{interpolation}' is not known{hint}")
-        if isinstance(record, Record):
+        if isinstance(record, GroundMotion):
             if dt is not None:
                 raise DeclarationError(
                     f"RecordSource: record '{record.name}' has its own dt = {record.dt:g} s; "

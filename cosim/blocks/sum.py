@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.participant import Block
+from ..core.variables import Input, Output, Parameter
 from ..functions import dot
-from ..participant import Block
-from ..variables import Input, Output, Parameter
-from .ports import set_unit
+from .checks import set_unit
 
 
 class WeightedSum(Block):

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.participant import Block
+from ..core.variables import Output, Parameter
 from ..errors import DeclarationError, did_you_mean
-from ..participant import Block
-from ..variables import Output, Parameter
-from .ports import set_unit
+from .checks import set_unit
 
 
 class TableSource(Block):

@@ -15,7 +15,7 @@ from os import PathLike
 from pathlib import Path
 
 from ..errors import CosimError, FMUError, did_you_mean
-from ..fmi.archive import Archive
+from ..fmi.file.archive import Archive
 from ..fmi.fmu import FMU
 from . import misuse, probes
 from .report import Finding, Report

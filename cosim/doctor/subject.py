@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..errors import CosimError, FMUError
-from ..failures import Failures
-from ..fmi.continuous_time import ContinuousTime
-from ..fmi.events import EVENT_ITERATIONS
 from ..fmi.fmu import FMU
+from ..fmi.instance.continuous_time import ContinuousTime
+from ..fmi.instance.events import EVENT_ITERATIONS
 from ..fmi.ports import FMUPort
+from ..loop.signals import Failures
 
 #: values of ports by name, as the FMU gives them
 Values: TypeAlias = dict[str, np.ndarray[Any, Any]]

@@ -15,9 +15,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.time_grid import steps_between
 from ..errors import FMUError
-from ..time_grid import steps_between
-from .adapter import Adapter
+from .instance.adapter import Adapter
 
 _GIVEN = ("fixed", "tunable")  # intervals that the importer may set
 

@@ -19,19 +19,19 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..core.participant import Participant, rate
+from ..core.tableaus import TABLEAUS
 from ..errors import FMUError, did_you_mean
-from ..opcodes import Number
-from ..participant import Participant, rate
-from ..tableaus import TABLEAUS
-from .adapter import Adapter
-from .archive import Archive
+from ..loop.operations import Number
 from .clocks import clocks_of
-from .display_units import without_units
-from .fmi2 import Fmi2
-from .fmi3 import Fmi3
-from .model_description import description_of
+from .file.archive import Archive
+from .file.display_units import without_units
+from .file.model_description import description_of
+from .file.shared_library import library_name
+from .instance.adapter import Adapter
+from .instance.fmi2 import Fmi2
+from .instance.fmi3 import Fmi3
 from .ports import FMUPort, Shape, ports
-from .shared_library import library_name
 
 Interface = Literal["CoSimulation", "ModelExchange"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4", "cvode"]

@@ -23,14 +23,14 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
+from ..core.participant import Block, Participant
 from ..errors import CosimError, WiringError, did_you_mean
-from ..fmi.archive import Archive, Extraction
+from ..fmi.file.archive import Archive, Extraction
+from ..fmi.file.model_description import read_description
 from ..fmi.fmu import FMU
-from ..fmi.model_description import read_description
 from ..fmi.ports import unit_of
-from ..fmi.text_ports import text_port
-from ..participant import Block, Participant
-from ..system import Member, System, inputs_of, outputs_of
+from ..system.system import Member, System, inputs_of, outputs_of
+from ..system.text_ports import text_port
 from .format import (
     FMU_TYPE,
     NAMESPACES,

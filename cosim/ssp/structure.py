@@ -16,18 +16,7 @@ from typing import TypeAlias
 from lxml import etree
 
 from ..errors import did_you_mean
-from .format import (
-    NAMESPACES,
-    SSB,
-    SSC,
-    SSD,
-    SSPError,
-    factor_and_offset,
-    flag,
-    numbers,
-    own_annotation,
-    tag,
-)
+from .format import NAMESPACES, SSB, SSC, SSD, SSPError, factor_and_offset, flag, numbers, own_annotation, tag
 
 Path: TypeAlias = tuple[str, ...]
 #: kinds of connectors that give a value to the outside of their element

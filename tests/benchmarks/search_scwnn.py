@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from cosim import simulate
-from cosim.earthquakes import NAMES, available, earthquake
-from scenarios import _bridge_control as control
-from scenarios._bridge_control import SEARCH_RECORDS, SEARCH_SPACE
-from scenarios._bridge_criteria import PORTS, criteria, response
+from scenarios.highway_bridge import control
+from scenarios.highway_bridge.control import SEARCH_RECORDS, SEARCH_SPACE
+from scenarios.highway_bridge.criteria import PORTS, criteria, response
+from scenarios.highway_bridge.earthquakes import NAMES, available, earthquake
 
 COUNTED = [f"J{i}" for i in (*range(1, 7), *range(9, 15))]
 

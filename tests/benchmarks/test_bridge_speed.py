@@ -14,10 +14,10 @@ import numpy as np
 import scipy.linalg as la
 
 from cosim import FMU, System, simulate
-from cosim.earthquakes import earthquake
 from fmus.export import export
-from fmus.highway_bridge import BEARING
-from scenarios import _bridge_control as control
+from scenarios.highway_bridge import control
+from scenarios.highway_bridge.bridge import BEARING
+from scenarios.highway_bridge.earthquakes import earthquake
 from tests.benchmark_data import BRIDGE
 
 H = control.STEP

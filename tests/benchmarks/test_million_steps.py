@@ -20,12 +20,12 @@ import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
-from controllers.algorithm_1 import AlgorithmI
-from controllers.sliding_surface import SlidingSurface
+from controllers.laws.algorithm_1 import AlgorithmI
+from controllers.laws.sliding_surface import SlidingSurface
 from cosim import FMU, System, simulate
 from cosim.blocks import LowPass, SensorDynamics
-from fmus.cached import as_fmu
-from fmus.oscillator import Oscillator
+from fmus.export import as_fmu
+from fmus.plants.oscillator import Oscillator
 
 N = 1_000_000
 H = 0.01

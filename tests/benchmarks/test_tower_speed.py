@@ -18,12 +18,12 @@ import numpy as np
 import scipy.linalg as la
 from fmpy.fmi2 import FMU2Slave
 
-from controllers.condensation import first_order
+from controllers.design.condensation import first_order
 from cosim import FMU, simulate
-from fmus.tall_building import with_damper
-from scenarios import tall_building
-from scenarios._tower_criteria import FLOORS
-from scenarios._tower_design import SURFACE_WEIGHTS, tower_observer
+from scenarios.tall_building import study as tall_building
+from scenarios.tall_building.building import with_damper
+from scenarios.tall_building.control import SURFACE_WEIGHTS, tower_observer
+from scenarios.tall_building.criteria import FLOORS
 
 H = tall_building.PERIOD
 WATCHED = ["tower.x", "tower.a", "tower.x_m", "tower.u", "power.p"]
@@ -122,8 +122,8 @@ def test_memory_of_a_default_run() -> None:
     """
     # VmHWM and not ru_maxrss, which starts from the size of the process that started this one
     code = (
-        "import sys; from scenarios import tall_building;"
-        "tall_building.run(duration=float(sys.argv[1]));"
+        "import sys; from scenarios.tall_building import study;"
+        "study.run(duration=float(sys.argv[1]));"
         "status = open('/proc/self/status').read(); print(status.split('VmHWM:')[1].split()[0])"
     )
     root = Path(__file__).parents[2]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controllers.kinematic_observer import KinematicObserver
-from controllers.modal_truncation import modal_state_space
-from controllers.viscous_dampers import ViscousDampers
+from controllers.design.modal_truncation import modal_state_space
+from controllers.laws.viscous_dampers import ViscousDampers
+from controllers.observers.kinematic_observer import KinematicObserver
 
 
 def structure(n=6):

@@ -11,13 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-import cosim.simulation
-from cosim import Result, System, simulate
-from cosim.errors import RecordError, WiringError
-from cosim.result import Statistics
-
-from .parts import Counter, Gain, Mass
-from .test_wiring import Three
+import cosim.run.simulation
+from cosim import RecordError, Result, Statistics, System, WiringError, simulate
+from tests.cosim.parts import Counter, Gain, Mass
+from tests.cosim.system.test_system import Three
 
 
 def loop() -> System:
@@ -84,7 +81,7 @@ def test_inputs_slices_and_everything_can_be_recorded():
 
 def test_long_records_spill_to_a_file(monkeypatch):
     wanted = simulate(loop(), step=0.01, stop=3.0)
-    monkeypatch.setattr(cosim.simulation, "MEMORY_LIMIT", 1000)
+    monkeypatch.setattr(cosim.run.simulation, "MEMORY_LIMIT", 1000)
     found = simulate(loop(), step=0.01, stop=3.0)
     assert isinstance(found["plant.x"].base, np.memmap)
     for name in wanted.signals:

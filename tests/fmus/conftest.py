@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from fmus.export import export
-
-from .host import PARTICIPANTS, Host
+from tests.fmus.export.host import PARTICIPANTS, Host
 
 
 @pytest.fixture(scope="session")

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import Result, simulate
-from cosim.app import main
-from cosim.errors import FMUError
+from cosim import FMUError, Result, simulate
+from cosim.cli.app import main
 from fmus.export import export
 from scenarios import building_in_fmpy, controller_in_ssp, external_plant
 from tests.others import swing

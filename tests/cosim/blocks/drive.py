@@ -6,9 +6,8 @@ import ctypes
 
 import numpy as np
 
-from cosim.compiler import kernel_addresses
-from cosim.participant import Block, Participant
-from cosim.variables import Array
+from cosim import Array, Block, Participant
+from cosim.codegen.kernels import kernel_addresses
 
 _KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
 

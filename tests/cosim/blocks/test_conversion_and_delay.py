@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim import System, simulate
+from cosim import DeclarationError, System, simulate
 from cosim.blocks import AnalogToDigital, Delay, RecordSource, Saturation
-from cosim.errors import DeclarationError
-
-from .drive import trace
+from tests.cosim.blocks.drive import trace
 
 levels = st.integers(1, 24)
 scales = st.floats(1e-6, 1e6)

@@ -5,17 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim import System, simulate
+from cosim import DeclarationError, System, simulate
 from cosim.blocks import MeasurementNoise, WhiteNoise
-from cosim.blocks.random_stream import (
-    SEED_JUMP,
-    STREAM_JUMP,
-    multiply_add,
-    remainder,
-    seed_streams,
-    uniform,
-)
-from cosim.errors import DeclarationError
+from cosim.blocks.random_stream import SEED_JUMP, STREAM_JUMP, multiply_add, remainder, seed_streams, uniform
 
 M = (2**32 - 209, 2**32 - 22853)
 A = (

@@ -22,8 +22,7 @@ from cosim.blocks import (
     function_source,
     transfer_function,
 )
-
-from .drive import assert_same_bits, drive
+from tests.cosim.blocks.drive import assert_same_bits, drive
 
 RNG = np.random.default_rng(7)
 BLOCKS = {

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from cosim import DeclarationError
 from cosim.blocks import SensorDynamics, StateSpace, StrictlyProper, transfer_function
-from cosim.errors import DeclarationError
-
-from .drive import trace
+from tests.cosim.blocks.drive import trace
 
 RNG = np.random.default_rng(5)
 #: Both sides are exact but for rounding: 300 steps of some ten operations at 1.1e-16, and

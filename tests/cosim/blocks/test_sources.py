@@ -5,11 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from cosim import Block, Input, Output, System, simulate
+from cosim import Block, DeclarationError, GroundMotion, Input, Output, System, simulate
 from cosim.blocks import Constant, RecordSource, WeightedSum, function_source
-from cosim.errors import DeclarationError
-from cosim.instances import CompiledKernelsWarning
-from cosim.records import Record
+from cosim.run.kernel_instance import CompiledKernelsWarning
 
 VALUES = np.random.default_rng(3).normal(size=90_001)
 
@@ -59,7 +57,7 @@ def test_scale_and_stage_times():
 
 
 def test_a_record_brings_dt_unit_and_start():
-    source = RecordSource(Record(0.5, np.array([1.0, 2.0]), "made", start=0.5))
+    source = RecordSource(GroundMotion(0.5, np.array([1.0, 2.0]), "made", start=0.5))
     assert source.variables["y"].unit == "m/s2"
     assert signal(source, 0.5, 1.5).tolist() == [0, 1, 2, 0]
 
@@ -78,7 +76,7 @@ def test_units_are_converted_at_a_connection():
         ({"record": [1.0, 2.0], "dt": 0.1, "interpolation": "Linear "}, "did you mean 'linear'"),
         ({"record": [1.0, np.nan], "dt": 0.1}, "not a number"),
         ({"record": [1.0, 2.0], "dt": 0.0}, "outside its bounds"),
-        ({"record": Record(0.1, np.ones(3), "made"), "dt": 0.2}, "resample"),
+        ({"record": GroundMotion(0.1, np.ones(3), "made"), "dt": 0.2}, "resample"),
         ({"record": np.ones((3, 2)), "dt": 0.2}, "dimensions"),
     ],
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .probe import write_fmu
+from tests.cosim.fmi.probe import write_fmu
 
 STATES = [("h", 'start="1"'), ("v", 'start="0"'), ("q", 'start="0"')]
 PARAMETERS = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .probe import write_fmu
+from tests.cosim.fmi.probe import write_fmu
 
 _DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="counter" instantiationToken="counter3">

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .probe import write_fmu
+from tests.cosim.fmi.probe import write_fmu
 
 _CONTINUOUS = [
     '<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>',

@@ -8,12 +8,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cosim import FMU, Block, Input, Output, Simulation, State, System, simulate
-from cosim.errors import FMUError, SimulationError, TimeError, WiringError
-from cosim.fmi.inspection import inspection
-
-from ..parts import Ramp
-from .metronome import metronome
+from cosim import (
+    FMU,
+    Block,
+    FMUError,
+    Input,
+    Output,
+    Simulation,
+    SimulationError,
+    State,
+    System,
+    TimeError,
+    WiringError,
+    simulate,
+)
+from cosim.cli.inspection import inspection
+from tests.cosim.fmi.metronome import metronome
+from tests.cosim.parts import Ramp
 
 H = 0.25
 K = np.arange(21)

@@ -9,13 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import FMU, Input, LinearContinuous, Output, Parameter, State, System, simulate
-from cosim.errors import FMUError, SimulationError, WiringError
-from fmus.description import DefaultExperiment
-from fmus.export import export
-
-from ..parts import Gain
-from ..test_faults import Diverges
+from cosim import (
+    FMU,
+    FMUError,
+    Input,
+    LinearContinuous,
+    Output,
+    Parameter,
+    SimulationError,
+    State,
+    System,
+    WiringError,
+    simulate,
+)
+from fmus.export import DefaultExperiment, export
+from tests.cosim.parts import Gain
+from tests.cosim.run.test_faults import Diverges
 
 
 class Chain(LinearContinuous):
@@ -175,7 +184,7 @@ def test_lines_of_the_log_go_to_the_fmu_that_they_come_from(capsys):
     """FMPy's native proxy has room for one logger; with one for each FMU the last one got everything."""
     import gc
 
-    from cosim.fmi.fmi2_log import callbacks
+    from cosim.fmi.instance.fmi2_log import callbacks
 
     class Instance:
         def __init__(self):

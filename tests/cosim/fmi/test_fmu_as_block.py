@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controllers.algorithm_1 import AlgorithmI
-from controllers.algorithm_2 import AlgorithmII
-from controllers.sliding_surface import SlidingSurface
+from controllers.laws.algorithm_1 import AlgorithmI
+from controllers.laws.algorithm_2 import AlgorithmII
+from controllers.laws.sliding_surface import SlidingSurface
 from cosim import FMU, System, simulate
 from cosim.blocks import WhiteNoise
 from fmus.export import export
-from fmus.oscillator import Oscillator
+from fmus.plants.oscillator import Oscillator
 
 STEP = 0.01
 RECORD = ["plant.x", "plant.v", "surface.s", "control.u", "control.M", "noise.y"]

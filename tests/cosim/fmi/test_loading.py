@@ -10,12 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from cosim import FMU, System, simulate
-from cosim.errors import FMUError
-from cosim.fmi.inspection import inspection
-
-from .metronome import metronome
-from .probe import changed, probe
+from cosim import FMU, FMUError, System, simulate
+from cosim.cli.inspection import inspection
+from tests.cosim.fmi.metronome import metronome
+from tests.cosim.fmi.probe import changed, probe
 
 
 def test_threads_load_one_at_a_time(tmp_path, monkeypatch):

@@ -12,15 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import FMU, System, simulate
-from cosim.errors import CosimError
-from cosim.ssp import read_package, read_ssp
+from cosim import FMU, CosimError, System, read_ssp, simulate
+from cosim.ssp import read_package
 from cosim.ssp.format import NAMESPACES
 from fmus.export import export
-from tests.fmus.ssp_parts import Damper, Watch, schema
-
-from ..fmi.probe import probe
-from ..parts import Gain, Integrator
+from tests.cosim.fmi.probe import probe
+from tests.cosim.parts import Gain, Integrator
+from tests.fmus.packaging.ssp_parts import Damper, Watch, schema
 
 SPACES = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
 REAL = "<ssc:Real/>"

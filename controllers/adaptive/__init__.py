@@ -1,0 +1,1 @@
+"""Laws that learn while they run."""

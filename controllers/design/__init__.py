@@ -1,0 +1,1 @@
+"""Models and designs: state space, reduction, Riccati equations, sliding surfaces."""

@@ -1,0 +1,48 @@
+"""Continuous sliding mode control of Yang, Wu and Agrawal (1995).
+
+    u = u_eq - delta (P B)' s,  u_eq = -(P B)^-1 P A x_hat,  s = P x_hat
+
+From the Lyapunov function V = s' s/2: V' = s' P B (u - u_eq) = -delta |(P B)' s|^2. No sign
+function, so nothing chatters. It stands in for the modified method (MSMC) of Wu and Yang
+(2004) in table 2.2, whose equations the thesis does not print.
+
+Where (P B)(P B)' = c 1 (one actuator), s' = -delta c s; `design` therefore takes that rate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+
+from cosim import Array, Block, Input, Output, Parameter
+from cosim.functions import matvec, matvec_add
+
+from ..design.condensation import StateSpace
+from ..design.surface_design import require_regular, sliding_surface
+
+
+class ContinuousSlidingMode(Block):
+    """u = -G x_hat - N s,  s = P x_hat"""
+
+    P = Parameter(shape=("m", "n"), meaning="sliding surface")
+    minus_G = Parameter(shape=("m", "n"), meaning="-(P B)^-1 P A, equivalent control")
+    minus_N = Parameter(shape=("m", "m"), meaning="-delta (P B)'")
+    x_hat = Input("estimated states", shape="n")
+    s = Output("sliding variable", shape="m")
+    u = Output("control force", shape="m", unit="N")
+
+    def step(self, t: float, h: float) -> None:
+        matvec(self.P, self.x_hat, self.s)
+        matvec(self.minus_G, self.x_hat, self.u)
+        matvec_add(self.minus_N, self.s, self.u)
+
+    @classmethod
+    def design(
+        cls, model: StateSpace, Q: Array, rate: float, every: int | None = None
+    ) -> ContinuousSlidingMode:
+        """rate: least rate of approach to the surface, 1/s; delta = rate / smallest (P B)(P B)'."""
+        P = sliding_surface(model.A, model.B, Q)
+        PB = P @ model.B
+        require_regular(PB, "ContinuousSlidingMode")
+        delta = rate / np.linalg.svd(PB, compute_uv=False)[-1] ** 2
+        return cls(P=P, minus_G=-la.solve(PB, P @ model.A), minus_N=-delta * PB.T, every=every)

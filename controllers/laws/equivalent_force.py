@@ -1,0 +1,60 @@
+"""Sliding mode control of a state-space model with a gain law of its own (thesis.txt, 2.3.1 and 5.2).
+
+    s = P x_hat                                                         (2.13)
+    u = (P B)^-1 (-P A x_hat + switching),  switching = -M sgn s         (2.15)
+
+(2.15) in two blocks, so that any gain law of chapter 4 (Algorithms I and II, the
+gain by equivalent control) gives `switching`: surface -> gain law -> force. One actuator.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cosim import Array, Block, Input, Output, Parameter
+from cosim.functions import dot
+
+from ..design.condensation import StateSpace
+from ..design.riccati import DesignError
+from ..design.surface_design import require_regular, sliding_surface
+
+
+class StateSurface(Block):
+    """s = P x_hat   (2.13)"""
+
+    P = Parameter(0.0, "sliding surface", shape="n")
+    x_hat = Input("estimated states", shape="n")
+    s = Output("sliding variable")
+
+    def step(self, t: float, h: float) -> None:
+        self.s = dot(self.P, self.x_hat)
+
+
+class EquivalentForce(Block):
+    """u = (P B)^-1 (-P A x_hat + switching)   (2.15)"""
+
+    PA = Parameter(0.0, "P A", shape="n")
+    PB_inv = Parameter(0.0, "(P B)^-1")
+    x_hat = Input("estimated states", shape="n")
+    switching = Input("-M sgn s of a gain law")
+    u = Output("control force", unit="N")
+
+    def step(self, t: float, h: float) -> None:
+        self.u = self.PB_inv * (self.switching - dot(self.PA, self.x_hat))
+
+
+def design(model: StateSpace, Q: Array) -> tuple[StateSurface, EquivalentForce]:
+    """Surface and force for one actuator; Q (n, n) as for `SlidingMode.design`."""
+    if model.B.shape[1] != 1:
+        raise DesignError(
+            f"equivalent_force: {model.B.shape[1]} actuators, "
+            "the gain laws of chapter 4 take one; use SlidingMode"
+        )
+    P = sliding_surface(model.A, model.B, Q)
+    PB = P @ model.B
+    require_regular(PB, "equivalent_force")
+    row = np.ascontiguousarray
+    return (
+        StateSurface(P=row(P[0])),
+        EquivalentForce(PA=row((P @ model.A)[0]), PB_inv=1.0 / float(PB[0, 0])),
+    )

@@ -1,0 +1,40 @@
+"""Linear state feedback, and its optimal gain: with an observer, LQG control.
+
+    u = -K x_hat,  K = R^-1 (B' X + N')
+    X minimises int (x' Q x + 2 x' N u + u' R u) dt
+
+x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}]. `weight_outputs` turns weights on
+outputs z = C x + D u into Q, N, R.
+"""
+
+from __future__ import annotations
+
+from cosim import Array, Block, Input, Output, Parameter
+from cosim.functions import matvec
+
+from ..design.condensation import StateSpace
+from ..design.riccati import regulator
+
+
+class StateFeedback(Block):
+    """u = -K x_hat"""
+
+    minus_K = Parameter(shape=("m", "n"), meaning="negative gain")
+    x_hat = Input("estimated states", shape="n")
+    u = Output("control force", shape="m", unit="N")
+
+    def step(self, t: float, h: float) -> None:
+        matvec(self.minus_K, self.x_hat, self.u)
+
+    @classmethod
+    def lqg(
+        cls, model: StateSpace, Q: Array, R: Array, N: Array | None = None, every: int | None = None
+    ) -> StateFeedback:
+        """Make the linear-quadratic regulator of a model."""
+        _, K = regulator(model.A, model.B, Q, R, N, what="LQG regulator")
+        return cls(minus_K=-K, every=every)
+
+
+def weight_outputs(C: Array, D: Array, weight: Array) -> tuple[Array, Array, Array]:
+    """Q, N and the addition to R from z' weight z with z = C x + D u."""
+    return C.T @ weight @ C, C.T @ weight @ D, D.T @ weight @ D

@@ -1,0 +1,1 @@
+"""The command line: `cosim list`, `run`, `table`, `export`, `inspect`, `doctor`."""

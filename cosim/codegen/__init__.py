@@ -1,0 +1,1 @@
+"""From a kernel in Python to LLVM IR and native code."""

@@ -1,0 +1,1 @@
+"""Declarations: variables, participants, the time grid."""

@@ -1,0 +1,412 @@
+"""Participants: blocks and continuous systems, and the record that holds their variables.
+
+A participant is declared once (variables.py) and its equations are written once, as
+kernels: methods that read and write `self`. All variables of an instance lie in one
+record of float64 slots, zone by zone:
+
+    inputs | outputs | states | derivatives | locals | parameters
+
+Called on the instance a kernel is ordinary Python; compiled (compiler.py) `self` is
+the record itself. The zones are visible to kernels as arrays too: `input_vector`,
+`state_vector`, `derivative_vector`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import math
+from collections.abc import Callable, Mapping
+from numbers import Real
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import DeclarationError, did_you_mean
+from ..functions import integrate_ode4, linear_hold
+from .variables import KINDS, Array, Local, Parameter, Variable
+
+#: kernels, and how many of (t, h) each takes
+KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
+_VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
+#: what every instance has of its own, and no copy may share
+_BOUND = {"memory", "variables", "zones", "_views", *_VECTORS}
+_RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
+#: size names that a Continuous works out itself
+_AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
+
+
+def whole_number(what: str, value: Any) -> int:
+    """Return a number that has to be whole and above zero as an int."""
+    number = float(value) if isinstance(value, Real) else math.nan
+    if not (number.is_integer() and number >= 1.0):
+        raise DeclarationError(f"{what}={value!r} is no whole number, 1 or more")
+    return int(number)
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy; an open file and the like cannot be copied and is shared."""
+    with contextlib.suppress(TypeError):
+        return copy.deepcopy(value)
+    return value
+
+
+def rate(where: str, every: Any, sample_period: Any) -> tuple[int | None, float | None]:
+    """Return `every` and `sample_period` of a block, of which one at most is given."""
+    if every is not None and sample_period is not None:
+        raise DeclarationError(f"{where}: give every or sample_period, not both")
+    if sample_period is not None and not (
+        isinstance(sample_period, Real) and math.isfinite(sample_period) and float(sample_period) > 0.0
+    ):
+        raise DeclarationError(f"{where}: sample_period={sample_period!r} s is not above zero")
+    return (
+        None if every is None else whole_number(f"{where}: every", every),
+        None if sample_period is None else float(sample_period),
+    )
+
+
+class Participant:
+    """What blocks and continuous systems share: declared variables in one record."""
+
+    #: names of the methods that are kernels, in the order in which a run uses them
+    KERNELS: ClassVar[tuple[str, ...]] = ()
+    #: False: the kernels contain Python that Numba cannot compile; they are called back
+    compiled: ClassVar[bool] = True
+    _declared: ClassVar[dict[str, Variable]] = {}
+
+    input_vector: Array
+    state_vector: Array
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        declared: dict[str, Variable] = {}
+        for base in reversed(cls.__mro__):
+            for name, value in vars(base).items():
+                if isinstance(value, Variable) and value.kind != "derivative":
+                    declared[name] = value
+                elif name in declared and not isinstance(value, Variable):
+                    del declared[name]
+        cls._declared = cls._complete(declared)
+        for name, variable in cls._declared.items():
+            if cls._is_reserved(name):
+                raise DeclarationError(f"{cls.__name__}: '{name}' is a name of structcosim's own; rename it")
+            if not isinstance(variable.meaning, str):
+                raise DeclarationError(
+                    f"{cls.__name__}.{name}: its meaning is {variable.meaning!r}, which is no text; "
+                    "write a start value as start="
+                )
+            if variable.kind == "derivative":
+                setattr(cls, name, variable)
+        for name in cls.KERNELS:
+            kernel = vars(cls).get(name)
+            wanted = ("self", "t", "h")[: 1 + KERNEL_TIMES[name]]
+            code = getattr(kernel, "__code__", None)
+            if kernel is not None and (code is None or code.co_argcount != len(wanted)):
+                raise DeclarationError(f"{cls.__name__}.{name}: write it as def {name}({', '.join(wanted)})")
+
+    @classmethod
+    def _is_reserved(cls, name: str) -> bool:
+        """Tell whether a name is a method or an attribute of ours, not a variable."""
+        ours = [base for base in cls.__mro__ if base.__module__ == __name__]
+        return name in _RESERVED or any(
+            not isinstance(vars(b).get(name, cls._declared[name]), Variable) for b in ours
+        )
+
+    @classmethod
+    def _complete(cls, declared: dict[str, Variable]) -> dict[str, Variable]:
+        """Return the declarations with those that follow from others."""
+        return declared
+
+    def __init__(self, **values: Any) -> None:
+        sizes = self._sizes(values)
+        self._layout(sizes)
+        for name, variable in self.variables.items():
+            self._assign(variable, values.get(name, variable.start))
+
+    # ------------------------------------------------------------------ layout
+
+    @classmethod
+    def _sizes(cls, values: Mapping[str, Any]) -> dict[str, int]:
+        """Resolve the size names from given arrays and keywords; refuse what is unknown."""
+        where = cls.__name__
+        symbols = {n for v in cls._declared.values() for n in v.shape if isinstance(n, str)} - _AUTOMATIC
+        settable = [n for n, v in cls._declared.items() if v.kind not in ("derivative", "local")]
+        sizes: dict[str, int] = {}
+        for name, value in values.items():
+            if name in symbols:
+                sizes[name] = whole_number(f"{where}: size {name}", value)
+            elif name not in settable:
+                raise DeclarationError(
+                    f"{where} has no parameter or variable '{name}'"
+                    + did_you_mean(name, [*settable, *sorted(symbols)])
+                )
+        for name, value in values.items():
+            if name in symbols or name not in cls._declared:
+                continue
+            shape = cls._declared[name].shape
+            given = np.shape(value)
+            if given == () and shape:
+                continue
+            if len(given) != len(shape):
+                raise DeclarationError(
+                    f"{where}.{name} has {len(shape)} dimensions {shape}, got an array of shape {given}"
+                )
+            for symbol, n in zip(shape, given, strict=True):
+                wanted = symbol if isinstance(symbol, int) else sizes.setdefault(symbol, n)
+                if wanted != n:
+                    raise DeclarationError(
+                        f"{where}.{name}: shape {given} does not fit {shape}: {symbol} is {wanted}, not {n}"
+                    )
+        missing = symbols - sizes.keys()
+        if missing:
+            raise DeclarationError(
+                f"{where}: size {', '.join(sorted(missing))} is not known; "
+                f"give it as a keyword ({sorted(missing)[0]}=3) or give an array that has it"
+            )
+        return {**sizes, **cls._automatic_sizes(sizes)}
+
+    @classmethod
+    def _automatic_sizes(cls, sizes: Mapping[str, int]) -> dict[str, int]:
+        """Sizes that follow from the others."""
+        return {}
+
+    def _layout(self, sizes: Mapping[str, int]) -> None:
+        """Lay the variables into zones and allocate the record."""
+        self.variables: dict[str, Variable] = {}
+        slot = 0
+        zones: dict[str, tuple[int, int]] = {}
+        for kind in KINDS:
+            first = slot
+            for name, variable in self._declared.items():
+                if variable.kind == kind:
+                    shape = tuple(n if isinstance(n, int) else sizes[n] for n in variable.shape)
+                    if any(n < 1 for n in shape):
+                        raise DeclarationError(f"{type(self).__name__}.{name}: shape {shape} has no elements")
+                    self.variables[name] = variable.resolved(shape, slot)
+                    slot += self.variables[name].size
+            zones[kind] = (first, slot - first)
+        #: first slot and number of slots of each kind
+        self.zones = zones
+        self._bind(np.zeros(slot + 1))  # one spare slot: what an empty zone's vector shows
+
+    def _bind(self, memory: Array) -> None:
+        self.memory = memory
+        self._views: dict[str, Array] = {}
+        for name, v in self.variables.items():
+            shape = tuple(int(n) for n in v.shape)
+            self._views[name] = memory[v.slot : v.slot + v.size].reshape(shape)
+        for name, kind in _VECTORS.items():
+            first, size = self.zones[kind]
+            setattr(self, name, memory[first : first + size] if size else memory[-1:])
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The record as a NumPy dtype; the vectors overlap the variables of their zone."""
+        fields = {n: (v.slot, v.shape) for n, v in self.variables.items()}
+        spare = self.memory.size - 1
+        for name, kind in _VECTORS.items():
+            first, size = self.zones[kind]
+            fields[name] = (first, (size,)) if size else (spare, (1,))
+        return np.dtype(
+            {
+                "names": list(fields),
+                "formats": [("f8", shape) if shape else "f8" for _, shape in fields.values()],
+                "offsets": [8 * slot for slot, _ in fields.values()],
+                "itemsize": 8 * self.memory.size,
+            }
+        )
+
+    # ------------------------------------------------------------------ values
+
+    def _get(self, name: str) -> Any:
+        view = self._views[name]
+        return view if view.ndim else float(view)
+
+    def _set(self, name: str, value: Any) -> None:
+        variable = self.variables[name]
+        if variable.kind == "parameter":
+            self._assign(variable, value)
+        else:
+            self._views[name][...] = value
+
+    def _assign(self, variable: Variable, value: Any) -> None:
+        where = f"{type(self).__name__}.{variable.name}"
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise DeclarationError(
+                f"{where} takes numbers of shape {variable.shape}, got {value!r}"
+            ) from error
+        if array.shape not in ((), variable.shape):
+            raise DeclarationError(f"{where} has shape {variable.shape}, got {array.shape}")
+        if np.isnan(array).any():
+            raise DeclarationError(f"{where} is not a number; give finite values")
+        if (array < variable.min).any() or (array > variable.max).any():
+            raise DeclarationError(
+                f"{where} = {value!r} is outside its bounds [{variable.min:g}, {variable.max:g}]"
+            )
+        self._views[variable.name][...] = array
+
+    def fresh(self) -> Participant:
+        """Return a copy with a record of its own: what a run works on, so that runs repeat."""
+        other = copy.copy(self)
+        other._bind(self.memory.copy())
+        other.take_attributes(self.own_attributes())
+        return other
+
+    def own_attributes(self) -> dict[str, Any]:
+        """Return copies of what Python keeps on the instance beside the declared variables."""
+        return {n: _copied(vars(self)[n]) for n in vars(self).keys() - _BOUND}
+
+    def take_attributes(self, attributes: Mapping[str, Any]) -> None:
+        """Take copies of what `own_attributes` returned, in place of what there is."""
+        for name in vars(self).keys() - _BOUND - attributes.keys():
+            delattr(self, name)
+        for name, value in attributes.items():
+            setattr(self, name, _copied(value))
+
+    # ----------------------------------------------------------------- kernels
+
+    @property
+    def kernels(self) -> dict[str, Callable[..., None]]:
+        """The kernels that this class has, by name."""
+        return {name: getattr(type(self), name) for name in self.KERNELS if hasattr(type(self), name)}
+
+    def dependencies(self) -> dict[str, set[str]]:
+        """Which inputs and states each output and derivative depends on (a superset, by variable)."""
+        from .dependencies import dependencies
+
+        return dependencies(self)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(
+            f"{n}={self._get(n):g}" if not v.shape else f"{n}={v.shape}"
+            for n, v in self.variables.items()
+            if v.kind == "parameter" and not v.fixed
+        )
+        return f"{type(self).__name__}({shown})"
+
+
+class Block(Participant):
+    """A participant that acts at communication points: difference equations in `step(self, t, h)`.
+
+    every
+        acts at every `every`-th communication point and holds its outputs in between
+    sample_period
+        the same in seconds; the run refuses one that is no multiple of its step
+
+    With neither, the block acts at every communication point under sampled coupling,
+    and at every solver stage under stage coupling.
+    """
+
+    KERNELS = ("initialize", "step")
+
+    every: int | None
+    sample_period: float | None
+
+    def __init__(
+        self, *, every: int | None = None, sample_period: float | None = None, **values: Any
+    ) -> None:
+        where = type(self).__name__
+        if type(self).step is Block.step:
+            raise DeclarationError(f"{where} has no step(self, t, h); a Block needs one")
+        self.every, self.sample_period = rate(where, every, sample_period)
+        super().__init__(**values)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "der" in cls.__dict__ or "derivatives" in cls.__dict__:
+            raise DeclarationError(f"{cls.__name__}: a Block has no derivatives; derive from Continuous")
+
+    def step(self, t: float, h: float) -> None:
+        """Read the inputs at t, write the outputs that hold until the next call; h is the step."""
+        raise NotImplementedError
+
+
+class Continuous(Participant):
+    """A participant with continuous state: differential equations.
+
+    derivatives(self, t)
+        write `der_x` for every state `x` from states, inputs and parameters
+    outputs(self, t)
+        write the outputs; runs after `derivatives` and may use `der_x`
+    advance(self, t, h)
+        carry the states from t to t + h, inputs held. The one given here is the
+        classical Runge-Kutta method (ode4) in equal substeps of at most `max_step`;
+        a class with an exact solution overrides it.
+
+    A class with an `advance` and no `derivatives` (an implicit method, say) runs under
+    sampled coupling and leaves as a Co-Simulation FMU; stage coupling refuses it.
+    """
+
+    KERNELS = ("initialize", "derivatives", "outputs", "advance")
+
+    derivative_vector: Array
+    max_step = Parameter(np.inf, "largest internal step of advance", unit="s", min=1e-12, fixed=True)
+    integrator_work = Local(0.0, "stages of advance", shape=(3, "n_states"))
+
+    def __init__(self, **values: Any) -> None:
+        if not hasattr(type(self), "derivatives") and type(self).advance is Continuous.advance:
+            raise DeclarationError(
+                f"{type(self).__name__} has no derivatives(self, t); a Continuous needs it, or an advance "
+                "of its own (what has no continuous state is a Block)"
+            )
+        super().__init__(**values)
+
+    @classmethod
+    def _complete(cls, declared: dict[str, Variable]) -> dict[str, Variable]:
+        solver = next(base for base in cls.__mro__ if "advance" in vars(base))
+        if "max_step" not in vars(solver):
+            declared = {n: v for n, v in declared.items() if n not in ("max_step", "integrator_work")}
+        derived: dict[str, Variable] = {}
+        for name, state in declared.items():
+            derived[name] = state
+            if state.kind != "state":
+                continue
+            if f"der_{name}" in declared:
+                raise DeclarationError(
+                    f"{cls.__name__}: 'der_{name}' is the derivative of '{name}'; rename one of them"
+                )
+            if hasattr(cls, "derivatives"):
+                unit = None if state.unit is None else f"({state.unit})/s"
+                derived[f"der_{name}"] = Variable(
+                    "derivative", 0.0, f"derivative of {name}", unit, state.shape, name=f"der_{name}"
+                )
+        return derived
+
+    @classmethod
+    def _automatic_sizes(cls, sizes: Mapping[str, int]) -> dict[str, int]:
+        count = {"state": 0, "input": 0}
+        for variable in cls._declared.values():
+            if variable.kind in count:
+                count[variable.kind] += math.prod(
+                    n if isinstance(n, int) else sizes[n] for n in variable.shape
+                )
+        n, m = max(count["state"], 1), max(count["input"], 1)
+        return {"n_states": n, "n_inputs_and_one": m + 1, "n_hold": n + m + 1}
+
+    def advance(self, t: float, h: float) -> None:
+        integrate_ode4(self, t, h)
+
+
+class LinearContinuous(Continuous):
+    """A Continuous whose derivatives are linear in states and inputs, with constant coefficients.
+
+        x' = A x + B u + c
+
+    `advance` is exact for the input held over [t, t + h], for any h:
+
+        x(t + h) = e^(A h) x(t) + int_0^h e^(A s) ds (B u + c)
+
+    A, B and c are read off `derivatives` (unit states, unit inputs) whenever h changes.
+    """
+
+    hold_step = Local(0.0, "step for which the hold matrices are valid", unit="s")
+    hold_A = Local(0.0, "e^(A h), transposed", shape=("n_states", "n_states"))
+    hold_B = Local(0.0, "int e^(A s) ds [B, c], transposed", shape=("n_inputs_and_one", "n_states"))
+    hold_x = Local(0.0, "states at t", shape="n_states")
+    hold_u = Local(0.0, "inputs at t", shape="n_inputs_and_one")
+    hold_work = Local(0.0, "working memory of expm", shape=(4, "n_hold", "n_hold"))
+
+    def advance(self, t: float, h: float) -> None:
+        linear_hold(self, t, h)

@@ -1,0 +1,1 @@
+"""An .fmu file: archive, model description, display units, library."""

@@ -1,0 +1,41 @@
+"""The shared library in an FMU: its place, and whether it is whole."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+from ...errors import FMUError
+
+_SUFFIXES = {"win": ".dll", "dar": ".dylib"}
+
+
+def library_name(platform: str, identifier: str) -> str:
+    """Return the path in the archive, such as binaries/linux64/plant.so."""
+    system = platform.rpartition("-")[2][:3]
+    return f"binaries/{platform}/{identifier}{_SUFFIXES.get(system, '.so')}"
+
+
+def check_library(path: Path) -> None:
+    """Refuse an ELF library that is cut off: the system maps it, and dies of SIGBUS where it ends.
+
+    Anything else that is no library is refused by the loader itself. Program headers, 64-bit
+    little-endian: type, flags, offset, virtual and physical address, size in the file, ...
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(64)
+            if head[:6] != b"\x7fELF\x02\x01" or len(head) < 64:
+                return
+            (offset,), (size, count) = struct.unpack_from("<Q", head, 32), struct.unpack_from("<HH", head, 54)
+            file.seek(min(offset, path.stat().st_size))
+            table = file.read(size * count)
+    except OSError as error:
+        raise FMUError(f"{path.name} cannot be read: {error.strerror}") from error
+    length = path.stat().st_size
+    whole = size == 56 and len(table) == size * count
+    for i in range(count if whole else 0):
+        at, _, _, in_file = struct.unpack_from("<4Q", table, size * i + 8)
+        whole = whole and at + in_file <= length
+    if not whole:
+        raise FMUError(f"{path.name} is cut off at {length:,} bytes; build or copy the FMU again")

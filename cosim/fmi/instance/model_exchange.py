@@ -1,0 +1,247 @@
+"""A running FMU with Model Exchange: integrated here, its events handled.
+
+Under sampled coupling it is integrated over each communication step with its inputs held:
+by CVODE, from event to event (event_steps.py), or by a fixed-step method in equal
+substeps. That one runs in the compiled loop; a step in which a time event is due is
+split there, and a state event is handled at the end of the step. Under stage coupling it
+is integrated by the method of all, with one step for all: events are handled at its end.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...core.tableaus import TABLEAUS
+from ...errors import CosimError
+from ...loop.operations import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
+from ...loop.signals import Failures
+from ...run.kernel_instance import buffer
+from ..fmu import FMU
+from .continuous_time import ContinuousTime
+from .event_steps import EventSteps, RungeKutta
+from .events import EventInstance
+
+
+class LateEventWarning(UserWarning):
+    """An event was handled at the end of the step that runs over it."""
+
+
+class ModelExchangeInstance(EventInstance):
+    """One instance of an FMU in a run, with Model Exchange."""
+
+    model_exchange: ClassVar[bool] = True
+
+    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
+        super().__init__(name, fmu, failures, used)
+        try:
+            self.n_states, self.n_indicators = self.fmi.counts()
+        except CosimError:
+            self.stop()
+            raise
+        self.states = buffer(self.n_states)
+        self.state_address = int(self.states.ctypes.data)
+        self.flags = np.zeros(2, dtype=self.fmi.FLAG)
+        self.signs = buffer(self.n_indicators) > 0.0
+        self.stages = buffer(5 * self.n_states)
+        self.event_callback: Any = None
+        self.callbacks: list[Any] = []
+        self.model = ContinuousTime(self.fmi, self.n_states, self.n_indicators)
+        #: what integrates it under sampled coupling
+        self.solver = fmu.solver or ("cvode" if self.n_indicators else "ode4")
+        self.steps: EventSteps | None = None
+        self.is_late = False
+
+    def start(self, t0: float) -> None:
+        """Take the FMU through initialization and the events of the start."""
+        super().start(t0)
+        self._start_events(t0)
+
+    def arrays(self) -> list[Any]:
+        """Return the memory that belongs to the state of this instance."""
+        return [*super().arrays(), self.states, self.flags, self.signs]
+
+    # ---------------------------------------------------------------------- operations
+
+    def _callback(self, function: Callable[[float, float], None]) -> int:
+        self.callbacks.append(self.failures.guard(self.name, function))
+        return ctypes.cast(self.callbacks[-1], ctypes.c_void_p).value or 0
+
+    def advance(self) -> list[Op]:
+        """Integrate over the step, with the inputs held."""
+        if self.solver == "cvode":
+            text = f"{self.name}: cvode, tolerance {self.fmu.tolerance:g}, from event to event"
+            return [
+                Op(
+                    f"{text} (FMU, Python callback)",
+                    CALL,
+                    self._callback(self._carry_by_cvode),
+                    participant=self.name,
+                )
+            ]
+        split = self._callback(self._carry_by_fixed_steps)
+        event_time = int(self.event_time.ctypes.data)
+        text = f"{self.name}: {self.solver}, {self.fmu.substeps} substeps, split at time events (FMU)"
+        unless = Op(text, UNLESS_EVENT, c=split, d=event_time, participant=self.name)
+        return [unless, *self._fixed_steps(), Op("", END, participant=self.name)]
+
+    def _fixed_steps(self) -> list[Op]:
+        """Integrate by Runge-Kutta over the model's derivatives."""
+        nodes, rows, weights = TABLEAUS[self.solver]
+        part = 1.0 / self.fmu.substeps
+        base = self.stages.ctypes.data
+        ops: list[Op] = []
+        for j in range(self.fmu.substeps):
+            ops.append(Op("", COPY, a=self.state_address, b=base, n=self.n_states, weights=(1.0, 0.0)))
+            for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
+                c = (j + node) * part
+                if i > 0:
+                    ops += [self._combine(base, [part * w for w in row]), *self.set_states(c)]
+                else:
+                    ops += self.set_states(c)
+                ops += self.derivatives(base + 8 * self.n_states * (1 + i), c)
+            ops.append(self._combine(base, [part * w for w in weights]))
+        return [*ops, *self.set_states(1.0), *self.complete()]
+
+    def _combine(self, base: int, weights: list[float]) -> Op:
+        slopes = base + 8 * self.n_states
+        return Op(
+            "", COMBINE, a=base, b=slopes, c=self.state_address, n=self.n_states, weights=tuple(weights)
+        )
+
+    def _vector(self, name: str, address: int) -> Op:
+        n = self.n_states
+        return Op("", FMI_VECTOR, self._function(name), self._component, address, n=n, participant=self.name)
+
+    def set_states(self, fraction: float) -> list[Op]:
+        """Set time and states."""
+        time = self._function(f"{self.fmi.PREFIX}SetTime")
+        ops = [Op("", FMI_TIME, time, self._component, fraction=fraction, participant=self.name)]
+        states = f"{self.fmi.PREFIX}SetContinuousStates"
+        return [*ops, self._vector(states, self.state_address)] if self.n_states else ops
+
+    def derivatives(self, target: int, fraction: float) -> list[Op]:
+        """Get the derivatives into `target`."""
+        return [self._vector(self.fmi.DERIVATIVES, target)] if self.n_states else []
+
+    def complete(self) -> list[Op]:
+        """Tell the model that a step is completed; handle its events."""
+        # always told, even where the model says that it need not be: FMPy reads that flag inverted
+        function = self._function(f"{self.fmi.PREFIX}CompletedIntegratorStep")
+        flags, event_time = int(self.flags.ctypes.data), int(self.event_time.ctypes.data)
+        told = Op(
+            "", self.fmi.COMPLETED, function, self._component, flags, self._events_address(), event_time
+        )
+        ops = [replace(told, fraction=1.0, participant=self.name)]
+        if self.n_indicators:
+            text = f"{self.name}: events (Python callback)"
+            ops.append(Op(text, CALL, self._events_address(), fraction=1.0, participant=self.name))
+        return ops
+
+    def _events_address(self) -> int:
+        if self.event_callback is None:
+            self.event_callback = self.failures.guard(self.name, self._handle_events)
+        return ctypes.cast(self.event_callback, ctypes.c_void_p).value or 0
+
+    # ------------------------------------------------------------------ steps in Python
+
+    def _carry_by_cvode(self, t: float, h: float) -> None:
+        if self.steps is None:
+            from .cvode import Cvode
+
+            self.steps = self._event_steps(Cvode(self.model, t, self.fmu.tolerance))
+        self.model.set_time(t)
+        signs = self._indicator_signs()
+        if (signs != self.signs).any():  # the inputs that are new at t have led to an event
+            self._event(t, False)
+        self.steps.carry(t, h)
+        self.model.get_states(self.state_address)
+        self.signs[:] = self._indicator_signs()
+
+    def _carry_by_fixed_steps(self, t: float, h: float) -> None:
+        if self.steps is None:
+            self.steps = self._event_steps(RungeKutta(self.model, self.solver, self.fmu.substeps))
+        self.model.set_time(t)
+        self.steps.carry(t, h)
+        self.model.get_states(self.state_address)
+
+    def _event_steps(self, mover: Any) -> EventSteps:
+        return EventSteps(
+            self.model,
+            mover,
+            completed=self._completed,
+            event=self._event,
+            next_event=self.event_time,
+            interrupted=lambda: self.failures.interrupted,
+        )
+
+    def _completed(self, t: float, at_end: bool) -> bool:
+        """Tell the model of a completed step; return whether that asks for an event."""
+        event, end = self.fmi.attempt("complete a step", self.api.completedIntegratorStep)
+        if end:
+            self.failures.ask_to_end(self.name, t, at_end)
+        if event or self.solver == "cvode":  # which finds state events itself
+            return bool(event)
+        return bool((self._indicator_signs() != self.signs).any())
+
+    # -------------------------------------------------------------------------- events
+
+    def _indicator_signs(self) -> Any:
+        z = buffer(self.n_indicators)
+        self.model.get_indicators(z.ctypes.data)
+        return z > 0.0
+
+    def _handle_events(self, t: float, h: float) -> None:
+        """Handle what happened in a step of the compiled loop, which ends at t."""
+        if self.flags[1]:
+            self.failures.ask_to_end(self.name, t, True)
+        signs = self._indicator_signs()
+        due = float(self.event_time[0])
+        timed = due <= t + SLACK * h
+        if timed and due >= t - SLACK * h:
+            self.model.set_time(due)  # exactly: t is it to rounding
+        elif due < t - SLACK * h:
+            self._warn_late(
+                f"a time event at t = {due:g} s, inside the step to t = {t:g} s, and is told at its end: "
+                "stage coupling has one step for all participants; choose one that meets the event, or "
+                "sampled coupling"
+            )
+        changed = bool((signs != self.signs).any())
+        if changed and not timed:
+            self._warn_late(
+                f"a state event in the step to t = {t:g} s, which is handled at its end: steps are "
+                'fixed; take smaller ones, or sampled coupling with solver="cvode", which locates it'
+            )
+        if timed or self.flags[0] or changed:
+            self._event(t, True)
+        else:
+            self.signs[:] = signs
+
+    def _warn_late(self, what: str) -> None:
+        """Say once what is handled late."""
+        if not self.is_late:
+            self.is_late = True
+            warnings.warn(f"{self.name} has {what}", LateEventWarning, stacklevel=3)
+
+    def _resume(self) -> None:
+        self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
+        self.model.get_states(self.state_address)
+        self.signs[:] = self._indicator_signs()
+
+    def locate(self, address: int) -> str:
+        """Return the name of the variable or state at an address, for an error message."""
+        found = super().locate(address)
+        state = (address - self.state_address) // 8
+        for unknown in self.fmu.description.derivatives if found == "?" and state >= 0 else []:
+            variable = unknown.variable.derivative
+            n = math.prod(self.fmu.shape_of(variable))
+            if state < n:
+                return str(variable.name) if n == 1 else f"{variable.name}[{state + 1}]"
+            state -= n
+        return found

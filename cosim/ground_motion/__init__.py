@@ -1,0 +1,5 @@
+"""Recorded ground motions: read, scaled, resampled."""
+
+from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
+
+__all__ = ["GroundMotion", "el_centro", "read_at2", "read_columns"]

@@ -1,0 +1,147 @@
+"""What ends a run before its time: exceptions of callbacks, requests to end, Ctrl-C, operations that fail.
+
+A C loop carries no exception. A callback leaves it here and returns status 1; the master
+raises it, with what was computed until then, once the loop is back.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..result import SimulationError
+from .operations import CALL, COMBINE, FMI2_VALUES, FMI3_VALUES, FROM_FLOAT, TO_FLOAT, Op
+
+#: a kernel: its record, t and h in s; status 0 when all went well
+KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
+
+
+class EndOfRun(Exception):
+    """A participant asks, inside a step, to end the run: a normal end, but the step is not completed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.text = text
+
+
+class Failures:
+    """Where callbacks leave an exception or a request to end for the master; a C loop cannot carry it."""
+
+    def __init__(self) -> None:
+        self.exception: BaseException | None = None
+        self.participant = ""
+        self.time = 0.0
+        #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
+        self.interrupted = False
+        #: who asked to end the run, and when; "" while nobody does
+        self.end = ""
+        #: (1,) 1 when the loop is to end at the next point
+        self.stop = np.zeros(1, dtype=np.int64)
+
+    def clear(self) -> None:
+        """Forget what happened: the simulation goes on from where it stands, or from a snapshot."""
+        self.exception, self.interrupted = None, False
+        self.set_end("")
+
+    def set_end(self, text: str) -> None:
+        """Let the run end at the next point, or go on if the text is empty."""
+        self.end, self.stop[0] = text, bool(text)
+
+    def ask_to_end(self, name: str, t: float, at_end: bool) -> None:
+        """Note that a participant asks at t to end the run.
+
+        At the end of a step the run goes on to the communication point that is reached;
+        inside it, EndOfRun leaves the step.
+        """
+        text = f"{name} asked to end the simulation at t = {t:.10g} s"
+        if not at_end:
+            raise EndOfRun(text)
+        self.set_end(self.end or text)
+
+    def error(self) -> SimulationError:
+        """Return the exception that was left as an error of the run."""
+        what = f"{type(self.exception).__name__}: {self.exception}"
+        asked = isinstance(self.exception, SimulationError)  # place and time are in it
+        failed = f"{self.participant} failed at t = {self.time:g} s: {what}"
+        error = SimulationError(str(self.exception) if asked else failed)
+        error.__cause__ = self.exception
+        return error
+
+    def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
+        """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""
+
+        def guarded(_: int, t: float, h: float) -> int:
+            try:
+                function(t, h)
+                if self.interrupted:
+                    raise KeyboardInterrupt
+            except BaseException as exception:
+                self.exception, self.participant, self.time = exception, name, t
+                return 1
+            return 0
+
+        return KERNEL(guarded)
+
+
+@contextmanager
+def ctrl_c(failures: Failures) -> Iterator[None]:
+    """Note Ctrl-C, to be acted upon between chunks or after a callback.
+
+    Raised at any moment it may strike while Python enters a callback from C, where the
+    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
+    """
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def note(number: int, frame: object) -> None:
+        if failures.interrupted:
+            raise KeyboardInterrupt
+        failures.interrupted = True
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+class Failing(Protocol):
+    """An instance, as far as an error about it needs it."""
+
+    name: str
+
+    def locate(self, address: int, /) -> str:
+        """Return the name of the variable at an address."""
+
+    def failed(self, status: int, t: float, /) -> str:
+        """Return what a status of one of its operations at t means."""
+
+    def log(self) -> list[str]:
+        """Return what it logged at warning level and above."""
+
+
+def operation_error(op: Op, instance: Failing, t: float, k: int, status: int) -> SimulationError:
+    """Return what it means that an operation of an instance failed at t, in step k, with a status."""
+    values = {FMI2_VALUES: op.c, FMI3_VALUES: op.c, FROM_FLOAT: op.a, TO_FLOAT: op.b}
+    checked = {CALL: op.b, COMBINE: op.c, **values}
+    if status < 0 and op.code in checked:
+        variable = instance.locate(checked[op.code] + 8 * (-status - 1))
+        what = "is not finite (NaN or infinite)"
+        remedy = "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
+        if op.code == FROM_FLOAT:
+            what, remedy = f"is not {op.number.values}", "round or limit its source in a block"
+        elif op.code == TO_FLOAT and not op.number.is_float:
+            what, remedy = "is above 2^53, which a float does not hold", "do not connect or record it"
+        text = f"{instance.name}.{variable} {what} at t = {t:g} s (step {k}); {remedy}"
+    else:
+        text = f"{instance.failed(status, t)} (step {k})"
+    log = "".join(f"\n  {line}" for line in instance.log()[-8:])
+    return SimulationError(f"{text}\n  log of the FMU:{log}" if log else text)

@@ -1,0 +1,1 @@
+"""Force-deformation laws of elements."""

@@ -1,0 +1,155 @@
+"""Which element of which unknown depends on which known: ModelStructure of an FMU.
+
+`Participant.dependencies()` reads the kernels and answers by variable: a superset. By
+element it is refined here by running the model, where that is exact: the IR of the
+kernels compares no floating-point numbers, so the same instructions run whatever the
+values, and outputs are analytic functions of them (sums, products, quotients, functions
+of libm). An analytic function that does not depend on an element never changes with it;
+one that depends on it changes at almost every point. Points are drawn at random, and
+taken at zero too, where nothing large hides a small change in the last digit. Settable
+parameters are drawn as well, so that a coefficient that happens to be 0 counts.
+
+Where numbers are compared (a saturation, a sign, a hysteresis) the answer by variable stands.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim import Array, Continuous, Participant
+from cosim.codegen.kernels import load
+from cosim.core.variables import KINDS, Variable
+
+from .link import is_listed, reachable
+
+_DATA_DEPENDENT = re.compile(
+    r"\bfcmp\b|\bfpto[su]i\b|llvm\.(min|max|fabs|copysign|floor|ceil|trunc|round|rint)"
+)
+_PROBES = 3
+#: (y - a) + a differs from y in the last digits, and does not depend on a
+_ROUNDING = 1e-10
+#: more settable parameters than this are not probed
+_MOST_PARAMETERS = 200
+
+Evaluation = Callable[[Array, float], bool]
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Dependencies by slot.
+
+    running
+        of outputs, states and derivatives on inputs and states
+    initial
+        of outputs and derivatives on inputs, states and parameters when initialisation ends;
+        what is not in it may depend on all of them
+    """
+
+    derivative_of: Mapping[int, int]
+    running: Mapping[int, tuple[int, ...]]
+    initial: Mapping[int, tuple[int, ...]]
+
+
+def structure(participant: Participant, kernels: str) -> Structure:
+    """Return the structure of a participant whose kernels have been lowered to `kernels`."""
+    variables = participant.variables
+    slots = {kind: [s for v in variables.values() if v.kind == kind for s in _slots(v)] for kind in KINDS}
+    if not isinstance(participant, Continuous):
+        # What a block computed in its last step is held: nothing depends on an input at once.
+        held = {slot: () for kind in ("output", "state") for slot in slots[kind]}
+        return Structure({}, held, {} if "initialize" in participant.kernels else held)
+    with_derivatives = slots["state"] if slots["derivative"] else []  # none: it moves by advance alone
+    derivative_of = dict(zip(with_derivatives, slots["derivative"], strict=True))
+    running: dict[int, tuple[int, ...]] = {}
+    for name, known in participant.dependencies().items():
+        needed = tuple(s for v in variables.values() if v.name in known for s in _slots(v))
+        running |= dict.fromkeys(_slots(variables[name]), needed)
+    parameters = [s for v in _settable(participant) for s in _slots(v)]
+    unknown = sorted(running)
+    initial: dict[int, tuple[int, ...]] = {}
+    if not parameters and "initialize" not in participant.kernels:
+        initial = dict(running)
+    if unknown and not _DATA_DEPENDENT.search(_evaluation(participant, kernels)):
+        known_slots = [*slots["input"], *slots["state"]]
+        changed = _changes(participant, load(kernels), unknown, known_slots + parameters[:_MOST_PARAMETERS])
+        if changed is not None:
+            running = {u: tuple(s for s in known_slots if s in changed[u]) for u in unknown}
+            if len(parameters) <= _MOST_PARAMETERS:
+                initial = {u: tuple(sorted(changed[u])) for u in unknown}
+    running |= {slot: (slot,) for slot in slots["state"]}  # a state is known, and an output
+    return Structure(derivative_of, running, initial)
+
+
+def _settable(participant: Participant) -> list[Variable]:
+    return [v for v in participant.variables.values() if v.kind == "parameter" and is_listed(v)]
+
+
+def _slots(v: Variable) -> range:
+    return range(v.slot, v.slot + v.size)
+
+
+def _evaluation(participant: Participant, kernels: str) -> str:
+    """Return the IR of what an evaluation runs: `initialize` only if parameters can change what it does."""
+    names = ("derivatives", "outputs", *(["initialize"] if _settable(participant) else []))
+    return "".join(body for name in names for body in reachable(kernels, name).values())
+
+
+def _changes(
+    participant: Participant, address: Callable[[str], int], unknown: list[int], known: list[int]
+) -> dict[int, set[int]] | None:
+    """Return, for every unknown slot, the known ones that change it in a probe; None outside the domain."""
+    run = _runner(participant, address)
+    changed = {slot: set[int]() for slot in unknown}
+    slots = np.array(unknown)
+    first, size = participant.zones["local"]  # working memory: what is in it before does not matter
+    ports, rest = slice(0, first), slice(first + size, None)
+    generator = np.random.default_rng(1)
+    for probe in range(2 * _PROBES):
+        base = _point(participant, generator, origin=probe % 2 == 0)
+        t = generator.uniform(0.1, 1.0)
+        record = base.copy()
+        if not run(record, t) or not np.isfinite(record[slots]).all():
+            return None
+        before = record[slots]
+        for s in known:
+            record[ports], record[rest] = base[ports], base[rest]
+            record[s] = _moved(base[s], generator)
+            if not run(record, t):
+                return None
+            # negated, so that NaN is a change
+            same = np.abs(record[slots] - before) <= _ROUNDING * np.abs(before)
+            for slot in slots[~same]:
+                changed[int(slot)].add(s)
+    return changed
+
+
+def _moved(x: float, generator: np.random.Generator) -> float:
+    return float(x * generator.uniform(1.05, 1.1) if x else generator.uniform(0.5, 1.5))
+
+
+def _point(participant: Participant, generator: np.random.Generator, *, origin: bool) -> Array:
+    """Return a record to probe at: inputs and states at zero or at random, parameters near their values."""
+    record = participant.memory.copy()
+    for v in participant.variables.values():
+        here = slice(v.slot, v.slot + v.size)
+        if v.kind in ("input", "state"):
+            record[here] = 0.0 if origin else generator.normal(size=v.size)
+    for v in _settable(participant):
+        here = slice(v.slot, v.slot + v.size)
+        moved = record[here] * generator.uniform(0.9, 1.1, v.size)
+        moved += np.where(moved == 0.0, generator.uniform(0.1, 1.0, v.size), 0.0)
+        record[here] = np.clip(moved, v.min, v.max)
+    return record
+
+
+def _runner(participant: Participant, address: Callable[[str], int]) -> Evaluation:
+    """Return a function that evaluates a record as the FMU does, and tells whether that went well."""
+    prototype = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_double, ctypes.c_double)
+    names = [n for n in ("initialize", "derivatives", "outputs") if n in participant.kernels]
+    functions = [prototype(address(f"kernel_{name}")) for name in names]
+    return lambda record, t: not any(f(record.ctypes.data, t, 0.0) for f in functions)

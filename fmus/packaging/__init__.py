@@ -1,0 +1,1 @@
+"""Systems as files: SSP packages and FMU containers."""

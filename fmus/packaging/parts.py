@@ -1,0 +1,62 @@
+"""The participants of a system as FMU files: what a package of any kind (SSP, container) is made of."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cosim import FMU, CosimError, System
+from cosim.fmi.file.model_description import read_description
+from cosim.fmi.instance.fmi2 import Fmi2
+from cosim.fmi.instance.fmi3 import Fmi3
+from cosim.fmi.ports import FMUPort, Shape, ports
+from cosim.system.system import Member
+
+from ..export.fmu import export
+
+
+@dataclass
+class Part:
+    """A participant, its FMU file, and what the file declares."""
+
+    name: str
+    member: Member
+    file: bytes
+    description: Any
+    #: the file's name; participants with the same file share one
+    source: str = ""
+    ports: dict[str, FMUPort] = field(default_factory=dict)
+
+    def shape(self, variable: Any) -> Shape:
+        """Return the shape of a variable of the FMU."""
+        adapter = Fmi2 if self.description.fmiVersion.startswith("2") else Fmi3
+        return adapter.shape(variable, self.member.start if isinstance(self.member, FMU) else {})
+
+
+def fmu_parts(system: System, fmi_version: str, platforms: list[str] | None) -> dict[str, Part]:
+    """Export or read every participant's FMU; the same file goes in once."""
+    parts: dict[str, Part] = {}
+    sources: dict[bytes, str] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, member in system.participants.items():
+            if isinstance(member, FMU):
+                file = member.path
+            else:
+                file = Path(folder) / f"{name}.fmu"
+                try:
+                    export(member, file, fmi_version=fmi_version, platforms=platforms)
+                except CosimError as error:
+                    raise type(error)(f"participant {name}: {error}") from error
+            part = Part(name, member, file.read_bytes(), read_description(file))
+            part.source = sources.setdefault(hashlib.sha256(part.file).digest(), f"{name}.fmu")
+            if isinstance(member, FMU):
+                texts = member.text_inputs | member.text_outputs
+                part.ports = member.input_ports | member.output_ports
+                part.ports |= {n: FMUPort(n, (), None, v.type, (v,)) for n, v in texts.items()}
+            else:
+                part.ports = ports(part.description.modelVariables, part.shape)
+            parts[name] = part
+    return parts

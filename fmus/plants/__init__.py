@@ -1,0 +1,1 @@
+"""Structural plants: blocks of equations that are exported as FMUs."""

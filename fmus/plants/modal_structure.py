@@ -1,0 +1,113 @@
+"""A classically damped structure without damper, in its real modes (thesis.txt, (2.1)).
+
+    eta_j'' + d_j eta_j' + w_j eta_j = phi_j' f,  x = sum phi_j eta_j
+
+`advance` is exact for forces held over the step, for under-, critically and overdamped
+modes: with s = d/2 and p = w - s^2, the functions cos(sqrt(p) h) and sin(sqrt(p) h)/sqrt(p)
+continue to negative p as cosh and sinh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cosim import Array, Continuous, Input, Local, Output, Parameter, State
+from cosim.functions import transposed_matvec
+from scenarios.tall_building.building import Structure, StructureError, modes_of
+
+
+class ModalStructure(Continuous):
+    """M x'' + C x' + K x = f in real modes; exact for held forces."""
+
+    stiffness = Parameter(1.0, "factor on the stiffness", unit="1", min=0.01)
+    omega2 = Parameter(shape="n", meaning="squared frequencies", unit="1/s^2", fixed=True)
+    damping = Parameter(shape="n", meaning="2 zeta omega", unit="1/s", fixed=True)
+    shapes = Parameter(shape=("n", "n"), meaning="mass-normalised modes, by column", fixed=True)
+    shapes_out = Parameter(shape=("n", "f"), meaning="modes at the DOF with outputs, by row", fixed=True)
+
+    w = Input("forces on the DOF", shape="n", unit="N")
+    top = Input("further force on the last DOF", unit="N")
+    x = Output("displacements", shape="f", unit="m")
+    v = Output("velocities", shape="f", unit="m/s")
+    a = Output("accelerations", shape="f", unit="m/s^2")
+    eta = State(shape="n", meaning="modal coordinates")
+    eta_dot = State(shape="n", meaning="their derivatives")
+
+    if TYPE_CHECKING:
+        der_eta: Array
+        der_eta_dot: Array
+
+    g = Local(shape="n", meaning="modal forces of w")
+    hold_step = Local(0.0, "step that hold belongs to", unit="s")
+    hold = Local(shape=(5, "n"), meaning="2 x 2 transition by mode")
+
+    def derivatives(self, t: float) -> None:
+        transposed_matvec(self.shapes, self.w, self.g)
+        last = self.w.shape[0] - 1
+        for j in range(last + 1):
+            self.der_eta[j] = self.eta_dot[j]
+            self.der_eta_dot[j] = (
+                self.g[j]
+                + self.shapes[last, j] * self.top
+                - self.damping[j] * self.eta_dot[j]
+                - self.stiffness * self.omega2[j] * self.eta[j]
+            )
+
+    def outputs(self, t: float) -> None:
+        transposed_matvec(self.shapes_out, self.eta, self.x)
+        transposed_matvec(self.shapes_out, self.eta_dot, self.v)
+        transposed_matvec(self.shapes_out, self.der_eta_dot, self.a)
+
+    def advance(self, t: float, h: float) -> None:
+        if h != self.hold_step:
+            for j in range(self.omega2.shape[0]):
+                modal_hold(self.stiffness * self.omega2[j], self.damping[j], h, self.hold[:, j])
+            self.hold_step = h
+        transposed_matvec(self.shapes, self.w, self.g)
+        last = self.w.shape[0] - 1
+        for j in range(last + 1):
+            static = (self.g[j] + self.shapes[last, j] * self.top) / (self.stiffness * self.omega2[j])
+            away, speed = self.eta[j] - static, self.eta_dot[j]
+            self.eta[j] = static + self.hold[0, j] * away + self.hold[1, j] * speed
+            self.eta_dot[j] = self.hold[2, j] * away + self.hold[3, j] * speed
+
+    @classmethod
+    def of(cls, structure: Structure, floors: Sequence[int], stiffness: float = 1.0) -> ModalStructure:
+        """Make the plant of a structure; floors: DOF with outputs, counted from 1."""
+        modes = modes_of(structure)
+        outside = [f for f in floors if not 1 <= f <= structure.dof]
+        if outside or not len(floors):
+            raise StructureError(f"ModalStructure: floors {list(floors)} must be some of 1..{structure.dof}")
+        rows = np.asarray(floors, int) - 1
+        return cls(
+            omega2=modes.omega**2, damping=modes.damping, shapes=modes.shapes,
+            shapes_out=np.ascontiguousarray(modes.shapes[rows].T), stiffness=stiffness,
+        )  # fmt: skip
+
+
+def modal_hold(w: float, d: float, h: float, out: Array) -> None:
+    """out[:4] = transition of (eta - static, eta') over h for eta'' + d eta' + w eta = const."""
+    s = 0.5 * d
+    p = w - s * s
+    root = math.sqrt(abs(p))
+    if p > 0.0:
+        decay = math.exp(-s * h)
+        even = decay * math.cos(root * h)
+        odd = decay * (math.sin(root * h) / root)
+    elif p < 0.0:
+        # e^(-s h) cosh, sinh from the two real roots, without overflow of cosh
+        slow = math.exp(-w / (s + root) * h)
+        fast = math.exp(-(s + root) * h)
+        even = 0.5 * (slow + fast)
+        odd = 0.5 * (slow - fast) / root
+    else:
+        even = math.exp(-s * h)
+        odd = even * h
+    out[0] = even + s * odd
+    out[1] = odd
+    out[2] = -w * odd
+    out[3] = even - s * odd

@@ -1,0 +1,1 @@
+"""Structural models: frames, OpenSees models."""

@@ -1,0 +1,91 @@
+"""Figures of the highway bridge: sensors over time, nodes, hysteresis loops, yield map."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cosim import Array, Result
+
+from .bridge import EI, M_Y, SEGMENT
+from .criteria import BEARINGS, moments
+
+
+def displacements(result: Result, sensor: int, name: str) -> Figure:
+    """Displacement at a sensor (0, 1, ...) in x and y, beside the runs made for comparison."""
+    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True)
+    compared = [
+        ("none.deformation", "without control"),
+        ("lqg.deformation", "LQG"),
+        ("bridge.deformation", "this run"),
+    ]
+    for direction, ax in enumerate(axes):
+        for port, label in compared:
+            if port in result:
+                ax.plot(
+                    result.time, 1e3 * result[port][:, 2 * sensor + direction], linewidth=0.7, label=label
+                )
+        ax.set_ylabel(f"{'xy'[direction]} displacement (mm)")
+        ax.grid(alpha=0.3)
+    axes[0].set_title(f"Bridge displacement at the position of the {name} sensor")
+    axes[0].legend(loc="upper right", fontsize="small")
+    axes[-1].set_xlabel("time (s)")
+    return figure
+
+
+def nodes(result: Result) -> Figure:
+    """Number of wavelet nodes over time (figure 3.9)."""
+    figure = Figure(figsize=(7.0, 3.0), layout="constrained")
+    ax: Axes = figure.subplots()
+    ax.step(result.time, result["control.nodes"], where="post", linewidth=0.8)
+    ax.set_xlabel("time (s)")
+    ax.set_ylabel("wavelet nodes h(t)")
+    ax.grid(alpha=0.3)
+    return figure
+
+
+def loops(result: Result, curvatures: Array) -> Figure:
+    """Force over deformation of the bearing, moment over curvature of the end, that move most."""
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    deformation = result["bridge.deformation"][:, :BEARINGS]
+    i = int(np.abs(deformation).max(axis=0).argmax())
+    left.plot(1e3 * deformation[:, i], 1e-3 * result["bridge.force"][:, i], linewidth=0.6)
+    left.set_xlabel("deformation (mm)")
+    left.set_ylabel("force (kN)")
+    left.set_title(f"bearing {i // 2 + 1}, {'xy'[i % 2]}")
+    j = int(np.abs(curvatures).max(axis=0).argmax())
+    right.plot(1e3 * curvatures[:, j], 1e-6 * moments(result)[:, j], linewidth=0.6)
+    right.set_xlabel("curvature (1/km)")
+    right.set_ylabel("moment (MN m)")
+    right.set_title(f"column {j // (curvatures.shape[1] // 2) + 1}")
+    for ax in (left, right):
+        ax.grid(alpha=0.3)
+    return figure
+
+
+def yield_map(curvatures: Array) -> Figure:
+    """Largest curvature over that at yield, along both columns, bending in y and in x."""
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    ratio = np.abs(curvatures).max(axis=0) * EI / M_Y
+    per_column = len(ratio) // 2
+    for c, ax in enumerate(figure.subplots(1, 2, sharex=True, sharey=True)):
+        segments = ratio[c * per_column : (c + 1) * per_column].reshape(-1, 2, 2)  # segment, plane, end
+        heights = SEGMENT * np.arange(len(segments), -1, -1)
+        for plane, direction in enumerate("yx"):
+            for k, (top, bottom) in enumerate(pairwise(heights)):
+                ax.plot(
+                    segments[k, plane], [top, bottom], "o-", color=f"C{plane}",
+                    label=f"bending in {direction}" if k == 0 else None,
+                )  # fmt: skip
+        ax.axvline(1.0, color="black", linewidth=0.8)
+        ax.set_title(f"column {c + 1}")
+        ax.set_xlabel("largest curvature / yield curvature")
+        ax.set_ylabel("height above the base (m)")
+        ax.legend(fontsize="small")
+        ax.grid(alpha=0.3)
+    return figure

@@ -1,0 +1,389 @@
+"""FMUs in processes of their own: the same bits, and crashes that end the run and nothing else."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim import FMU, Block, FMUError, Output, Simulation, SimulationError, SnapshotError, System, simulate
+from cosim.codegen.c_compiler import LIBRARY_FLAGS, PLATFORMS, fmi_headers, host, zig_cc
+from cosim.fmi.instance.fmi2 import Fmi2
+from cosim.fmi.instance.fmi3 import Fmi3
+from cosim.loop.signals import Failures
+from fmus.export import export
+from tests.cosim.fmi.ball import ball
+from tests.cosim.fmi.metronome import metronome
+from tests.cosim.fmi.probe import probe, write_fmu
+from tests.cosim.fmi.test_fmu import Chain, closed
+
+H = 0.0625  # a binary fraction: times are exact
+VERSIONS = ["2.0", "3.0"]
+INTERFACES = ["CoSimulation", "ModelExchange"]
+
+
+def crash(folder: Path, fault: str = "none", interface: str = "CoSimulation") -> FMU:
+    """The FMU of c/crash.c."""
+    folder.mkdir(exist_ok=True)
+    text = f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="crash" guid="{fault}">
+<{interface} modelIdentifier="crash" canGetAndSetFMUstate="true" canSerializeFMUstate="true"/><ModelVariables>
+<ScalarVariable name="u" valueReference="0" causality="input"><Real start="1"/></ScalarVariable>
+<ScalarVariable name="x" valueReference="1" causality="output" initial="exact"><Real start="0"/>
+</ScalarVariable>
+<ScalarVariable name="der(x)" valueReference="2"><Real derivative="2"/></ScalarVariable>
+<ScalarVariable name="y" valueReference="3" causality="output"><Real/></ScalarVariable>
+</ModelVariables><ModelStructure><Outputs><Unknown index="2"/><Unknown index="4"/></Outputs>
+<Derivatives><Unknown index="3"/></Derivatives><InitialUnknowns><Unknown index="4"/></InitialUnknowns>
+</ModelStructure></fmiModelDescription>"""
+    return FMU(write_fmu(folder / "crash.fmu", text, "crash", "crash.c"), isolated=True)
+
+
+class One(Block):
+    """u = 1"""
+
+    u = Output()
+
+    def step(self, t, h):
+        self.u = 1.0
+
+
+def driven(plant: FMU) -> System:
+    return System({"plant": plant, "one": One()}, [("one.u", "plant.u")])
+
+
+def children(parent: int) -> set[int]:
+    """The processes that a process has started and not waited for, zombies too."""
+    found = set()
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = entry.read_text().rpartition(")")[2].split()
+        except OSError:  # it has ended meanwhile
+            continue
+        if int(fields[1]) == parent:
+            found.add(int(entry.parent.name))
+    return found
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_left():
+    """No test leaves a process, an open file or memory with a name."""
+    files, shared = len(os.listdir("/proc/self/fd")), set(os.listdir("/dev/shm"))
+    before = children(os.getpid())
+    yield
+    assert children(os.getpid()) <= before
+    assert len(os.listdir("/proc/self/fd")) <= files
+    assert set(os.listdir("/dev/shm")) <= shared
+    assert "structcosim (deleted)" not in Path("/proc/self/maps").read_text()
+
+
+def both(system_of, **options):
+    """Run without and with isolation; assert the same bits."""
+    plain, isolated = (simulate(system_of(flag), **options) for flag in (False, True))
+    assert plain.signals.keys() == isolated.signals.keys()
+    for name, values in plain.signals.items():
+        assert np.array_equal(values, isolated[name]), name
+    return plain
+
+
+# --------------------------------------------------------------------------- the same bits
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_an_exported_plant(tmp_path, version, interface):
+    path = export(Chain(), tmp_path / "chain.fmu", fmi_version=version, interfaces=[interface])
+    result = both(lambda flag: closed(FMU(path, isolated=flag)), step=0.01, stop=3.0)
+    assert np.ptp(result["plant.a"], axis=0).min() > 0.5
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_numbers_of_all_types_and_events(tmp_path, version, interface):
+    path = probe(tmp_path / "probe.fmu", version)
+    start = {"label": "façade", "r_in": 3.5, "i_in": -4} | ({"n": 3} if version == "3.0" else {})
+    options = {"start": start, "interface": interface}
+    both(lambda flag: System({"p": FMU(path, isolated=flag, **options)}), step=H, stop=4.0)
+
+
+def test_events_that_cvode_finds(tmp_path):
+    path = ball(tmp_path / "ball.fmu")
+    result = both(lambda flag: System({"b": FMU(path, isolated=flag)}), step=H, stop=4.0)
+    assert result["b.bounces"][-1] >= 2.0
+
+
+def test_event_mode_text_and_binary_data(tmp_path):
+    path = metronome(tmp_path / "metronome.fmu", event_mode=True)
+    start = {"word": "grün", "data": b"\0\1\2"}
+    both(lambda flag: System({"m": FMU(path, start=start, isolated=flag)}), step=0.1, stop=3.0)
+
+
+def test_as_block(tmp_path):
+    path = export(One(), tmp_path / "one.fmu")
+    result = both(lambda flag: System({"b": FMU(path, as_block=True, isolated=flag)}), step=H, stop=1.0)
+    assert result["b.u"][0] == 1.0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_states_are_saved_restored_and_branched(tmp_path, version):
+    path = export(Chain(), tmp_path / "chain.fmu", fmi_version=version)
+    with Simulation(closed(FMU(path, isolated=True)), step=0.01) as simulation:
+        simulation.run(1.0)
+        there = simulation.snapshot()
+        assert there.portable
+        first = simulation.run(2.0)
+        simulation.restore(there)
+        second = simulation.run(2.0)
+        simulation.restore(there)
+        with simulation.branch() as branch:  # in a process of its own
+            third = branch.run(2.0)
+    whole = simulate(closed(FMU(path)), step=0.01, stop=2.0)
+    for result in (first, second, third):
+        assert np.array_equal(result["plant.a"], whole["plant.a"][100:])
+
+
+def test_a_state_whose_bytes_serve_in_one_process_only(tmp_path):
+    """As those of the Reference FMUs, which hold the addresses of their vectors."""
+    system = driven(crash(tmp_path))
+    whole = simulate(system, step=H, stop=1.0)
+    with Simulation(system, step=H) as simulation:
+        simulation.run(0.5)
+        there = simulation.snapshot()
+        first = simulation.run(1.0)
+        simulation.restore(there)  # in its own process the addresses are good
+        with pytest.raises(SnapshotError, match=r"crashed with SIGSEGV(.|\n)*without isolated=True"):
+            simulation.branch()
+        second = simulation.run(1.0)
+    for result in (first, second):
+        assert np.array_equal(result["plant.y"], whole["plant.y"][8:])
+
+
+def test_several_instances_of_what_a_process_can_have_once_only(tmp_path):
+    path = probe(tmp_path / "once.fmu", "2.0", once=True)
+    members = {n: FMU(path, isolated=True, start={"r_in": float(i)}) for i, n in enumerate("abc")}
+    result = simulate(System(members), step=H, stop=H)
+    assert [result[f"{n}.r_out"][0] for n in "abc"] == [0.0, 2.0, 4.0]
+
+
+# ------------------------------------------------------------------------ calls one by one
+
+
+@contextmanager
+def instance(adapter, fmu):
+    """An instance by itself, to call its functions one by one."""
+    fmi = adapter(fmu, "p", False, Failures())
+    try:
+        yield fmi
+        fmi.api.freeInstance()
+    finally:
+        fmi.close()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_fmu_is_in_the_other_process_only(tmp_path, version):
+    """Versions of FMI find their library differently in FMPy; the same bits prove nothing here."""
+    with instance(
+        {"2.0": Fmi2, "3.0": Fmi3}[version], FMU(probe(tmp_path / "probe.fmu", version), isolated=True)
+    ):
+        (child,) = children(os.getpid())
+        assert "/probe.so" in Path(f"/proc/{child}/maps").read_text()
+        assert "/probe.so" not in Path("/proc/self/maps").read_text()
+
+
+def test_strings_and_many_arguments(tmp_path):
+    with instance(Fmi2, crash(tmp_path)) as fmi:
+        fmi.api.setString([0, 1], ["façade", "x" * 30])
+        assert fmi.api.getString([0, 0]) == [("façade" + "x" * 30).encode()] * 2
+        known, unknown, seed = [4, 5, 6], [1, 2], [0.0, 0.0, 0.25]
+        assert list(fmi.api.getDirectionalDerivative(unknown, known, seed)) == [160.25, 260.25]
+        with pytest.raises(FMUError, match="the FMU's library has no function fmi2GetInteger"):
+            fmi.attempt("get its values", lambda: fmi.api.getInteger([0]))
+
+
+def test_binary_data_with_zeros_in_it(tmp_path):
+    with instance(Fmi3, FMU(metronome(tmp_path / "m.fmu"), isolated=True)) as fmi:
+        for word, data in (("", b""), ("ein Wort", b"\0\1\2"), ("ü", b"ab\0")):
+            fmi.api.setString([40], [word])
+            fmi.api.setBinary([42], [data])
+            assert fmi.api.getString([41]) == [word + "!"]
+            assert bytes(fmi.api.getBinary([43])[0]) == data[::-1]
+        with pytest.raises(
+            FMUError, match="fmi3SetBinary passes more than the 255 MB that an isolated FMU has"
+        ):
+            fmi.attempt("set its data", lambda: fmi.api.setBinary([42], [bytes(1 << 28)]))
+
+
+def test_no_line_of_the_log_is_lost(tmp_path):
+    """500 lines in one call, which the shared memory has no room for at once."""
+    with pytest.raises(SimulationError, match="fmi2Error") as caught:
+        simulate(driven(crash(tmp_path, "DoStep flood 0.5")), step=H, stop=1.0)
+    lines = str(caught.value).splitlines()
+    assert lines[-8:] == [f"  [warning] line {i}" for i in range(492, 500)]
+    assert caught.value.result.time[-1] == 0.5
+
+
+def test_a_failed_set_stops_the_step_that_it_is_sent_with(tmp_path):
+    with pytest.raises(SimulationError, match=r"plant failed at t = 0\.5 s with fmi2Error") as caught:
+        simulate(driven(crash(tmp_path, "none refuse 0.5")), step=H, stop=1.0)
+    assert caught.value.result["plant.x"].tolist() == [k * H for k in range(9)]
+
+
+# --------------------------------------------------------------------------------- crashes
+
+ENDS = {
+    "null": r"crashed with SIGSEGV \(.*\)",
+    "abort": r"crashed with SIGABRT \(.*\)",
+    "exit": "ended its process with exit code 3",
+}
+
+
+@pytest.mark.parametrize("way", ENDS)
+@pytest.mark.parametrize("function", ["DoStep", "GetReal", "SetReal"])
+def test_a_crash_in_the_loop(tmp_path, function, way):
+    """At the ninth point; the eight before it are kept, and the ninth if its outputs could be read."""
+    plant = crash(tmp_path, f"{function} {way} 0.5")
+    text = rf"^plant \(crash.fmu\) {ENDS[way]} in fmi2{function} at t = 0\.5 s; .* \(step \d\)"
+    with pytest.raises(SimulationError, match=text) as caught:
+        simulate(driven(plant), step=H, stop=1.0)
+    assert f"[warning] {function} is at its fault, u = 1" in str(caught.value)
+    result = caught.value.result
+    assert result.time.tolist() == [k * H for k in range(8 if function == "GetReal" else 9)]
+    assert result["plant.x"].tolist() == result.time.tolist()
+    with pytest.raises(SimulationError, match=r"at t = 0\.5 s"):  # the FMU can be run again
+        simulate(driven(plant), step=H, stop=1.0)
+    assert simulate(driven(plant), step=H, stop=0.25)["plant.x"][-1] == 0.25
+
+
+@pytest.mark.parametrize("function", ["GetDerivatives", "CompletedIntegratorStep"])
+def test_a_crash_in_model_exchange(tmp_path, function):
+    plant = crash(tmp_path, f"{function} null 0.53", "ModelExchange")
+    text = rf"crashed with SIGSEGV .* in fmi2{function} at t = 0\.5[36]\d* s"
+    with pytest.raises(SimulationError, match=text) as caught:
+        simulate(driven(plant), step=H, stop=1.0)
+    # to rounding: x is integrated here
+    assert caught.value.result["plant.x"] == pytest.approx([k * H for k in range(9)], abs=1e-12)
+
+
+@pytest.mark.parametrize("way", ENDS)
+def test_a_crash_before_the_run(tmp_path, way):
+    with pytest.raises(SimulationError, match=f"{ENDS[way]} in fmi2Instantiate, when it was to instantiate"):
+        simulate(driven(crash(tmp_path, f"Instantiate {way}")), step=H, stop=1.0)
+    text = f"{ENDS[way]} in fmi2ExitInitializationMode at t = 0 s, when it was to exit init"
+    with pytest.raises(SimulationError, match=text) as caught:
+        simulate(driven(crash(tmp_path, f"ExitInitializationMode {way}")), step=H, stop=1.0)
+    assert len(caught.value.result.time) == 0
+
+
+@pytest.mark.parametrize("function", ["Terminate", "FreeInstance"])
+def test_a_crash_after_the_run_keeps_all_of_it(tmp_path, function):
+    text = f"in fmi2{function} at t = 1 s, after the run, which is complete"
+    with pytest.raises(SimulationError, match=text) as caught:
+        simulate(driven(crash(tmp_path, f"{function} abort 0.5")), step=H, stop=1.0)
+    assert caught.value.result.time[-1] == 1.0
+
+
+def test_a_library_that_cannot_be_loaded(tmp_path):
+    fmu = crash(tmp_path)
+    next(fmu.directory.glob("binaries/*/crash.*")).write_bytes(b"no library")
+    with pytest.raises(FMUError, match=r"the binary of .* cannot be loaded: .*crash"):
+        simulate(driven(fmu), step=H, stop=1.0)
+
+
+def test_a_crash_when_the_library_is_loaded(tmp_path, monkeypatch):
+    monkeypatch.setenv("CRASH_AT_LOAD", "1")
+    with pytest.raises(FMUError, match=r"cannot be loaded: crashed with SIGABRT \(.*\) when its library was"):
+        simulate(driven(crash(tmp_path)), step=H, stop=1.0)
+
+
+def test_runs_in_threads(tmp_path):
+    """Each instance finds its own process."""
+    plants = [crash(folder) for folder in (tmp_path / "a", tmp_path / "b", tmp_path / "c")]
+    systems = [
+        System({"plant": FMU(p.path, start={"u": 1.0 + i}, isolated=True)}) for i, p in enumerate(plants)
+    ]
+    with ThreadPoolExecutor(3) as pool:
+        results = list(pool.map(lambda s: simulate(s, step=H, stop=2.0), systems))
+    assert [r["plant.x"][-1] for r in results] == [2.0, 4.0, 6.0]
+
+
+def test_twenty_runs(tmp_path):
+    """What they would leave is seen by `nothing_is_left`: a process, a file or memory each."""
+    plant = crash(tmp_path)
+    for _ in range(20):
+        assert simulate(driven(plant), step=H, stop=H)["plant.x"][-1] == H
+
+
+# ---------------------------------------------------------------------------------- Ctrl-C
+
+HANG = """
+    import os, signal, sys, threading, time
+    from cosim import FMU, System, simulate, Interrupted
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
+    plant = FMU(sys.argv[1], isolated=True)
+    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        simulate(System({"plant": plant}), step=0.0625, stop=1.0)
+    except Interrupted as interrupted:
+        print("interrupted", len(interrupted.result.time))
+    except KeyboardInterrupt:
+        print("interrupted before")
+"""
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("DoStep hang 0.5", "interrupted 9"),
+        ("Instantiate hang", "interrupted before"),
+        ("ExitInitializationMode hang", "interrupted 0"),
+        ("Terminate hang", "interrupted 17"),
+    ],
+)
+def test_ctrl_c_while_the_fmu_hangs(tmp_path, fault, said):
+    """The signal goes to this process alone, as from a notebook; from a terminal the FMU's ignores it."""
+    fmu = crash(tmp_path, fault)
+    command = [sys.executable, "-c", textwrap.dedent(HANG), str(fmu.path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == said, done.stderr
+
+
+def test_the_fmu_ends_with_the_process_that_runs_it(tmp_path):
+    """Killed as by a lack of memory, while the FMU hangs and cannot be asked."""
+    fmu = crash(tmp_path, "DoStep hang 0.5")
+    script = textwrap.dedent(HANG).replace("1.0, os.kill", "60.0, os.kill")
+    parent = subprocess.Popen([sys.executable, "-c", script, str(fmu.path)])
+    deadline = time.monotonic() + 30.0
+    while not (fmus := children(parent.pid)):
+        assert time.monotonic() < deadline, "the FMU's process has not come up"
+        time.sleep(0.05)
+    time.sleep(0.3)  # until it hangs
+    parent.kill()
+    parent.wait()
+    while any(Path(f"/proc/{pid}").exists() for pid in fmus):
+        assert time.monotonic() < deadline, "the FMU's process has outlived its parent"
+        time.sleep(0.05)
+
+
+def test_the_c_code_compiles_without_a_warning(tmp_path):
+    options = ["-target", PLATFORMS[host()].target, *LIBRARY_FLAGS, "-Wshadow", "-Werror"]
+    sources = sorted((Path(cosim.__file__).parent / "fmi" / "isolation" / "c").glob("*.c"))
+    done = zig_cc([*options, f"-I{fmi_headers()}", *sources, "-o", tmp_path / "isolation"], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_after_a_fatal_answer_nothing_is_called(tmp_path):
+    """Outside the loop as in it; this FMU crashes if it is freed nevertheless, which `close` would report."""
+    simulation = Simulation(driven(crash(tmp_path, "EnterInitializationMode fatal 0")), step=H)
+    with pytest.raises(FMUError, match=r"fmi2EnterInitializationMode failed with status 4 \(fatal\)"):
+        simulation.run(1.0)
+    simulation.close()

@@ -1,0 +1,208 @@
+"""Libraries for five platforms, what cannot be linked, the cache, and files that repeat."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import importlib.util
+import struct
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import fmus.export.fmu
+import fmus.export.link
+from cosim import Block, CompilationError, Input, Output
+from cosim.codegen.c_compiler import fmi_headers
+from cosim.codegen.kernels import cache_directory
+from fmus.export import ExportError, export
+from fmus.export.fmu import FMI_VERSIONS
+from fmus.export.link import build_model, check_symbols
+from fmus.plants.oscillator import Oscillator
+from tests.fmus.export.host import ERROR, OK, Accumulator, Host
+
+ELF_MACHINE = {"x86_64": 62, "aarch64": 183}
+MACH_CPU = {"x86_64": 0x01000007, "aarch64": 0x0100000C}
+
+
+def binaries(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {n.removeprefix("binaries/"): archive.read(n) for n in archive.namelist() if "binaries/" in n}
+
+
+def elf(data: bytes) -> tuple[bytes, int]:
+    return data[:4], struct.unpack_from("<H", data, 18)[0]
+
+
+@pytest.mark.parametrize("architecture", ["x86_64", "aarch64"])
+def test_linux(tmp_path: Path, architecture: str) -> None:
+    found = binaries(export(Oscillator(), tmp_path / "o.fmu", platforms=[f"{architecture}-linux"]))
+    assert elf(found["linux64/Oscillator.so"]) == (b"\x7fELF", ELF_MACHINE[architecture])
+
+
+def test_both_linux_architectures(tmp_path: Path) -> None:
+    """linux64 is x86_64, as FMI 2.0 means it; the other has the name that FMI 3.0 gives it."""
+    found = binaries(export(Oscillator(), tmp_path / "o.fmu", platforms=["aarch64-linux", "x86_64-linux"]))
+    assert {n: elf(data)[1] for n, data in found.items()} == {
+        "linux64/Oscillator.so": ELF_MACHINE["x86_64"],
+        "aarch64-linux/Oscillator.so": ELF_MACHINE["aarch64"],
+    }
+
+
+def test_macos_is_one_universal_library(tmp_path: Path) -> None:
+    found = binaries(export(Oscillator(), tmp_path / "o.fmu", platforms=["x86_64-darwin", "aarch64-darwin"]))
+    data = found.pop("darwin64/Oscillator.dylib")
+    assert not found
+    magic, count = struct.unpack_from(">2I", data)
+    assert (magic, count) == (0xCAFEBABE, 2)
+    cpus = set()
+    for i in range(count):
+        cpu, _, offset, size, alignment = struct.unpack_from(">5I", data, 8 + 20 * i)
+        assert offset % (1 << alignment) == 0
+        assert offset + size <= len(data)
+        inner_magic, inner_cpu = struct.unpack_from("<2I", data, offset)
+        assert (inner_magic, inner_cpu) == (0xFEEDFACF, cpu)
+        cpus.add(cpu)
+    assert cpus == set(MACH_CPU.values())
+
+
+def test_macos_on_one_architecture(tmp_path: Path) -> None:
+    data = binaries(export(Oscillator(), tmp_path / "o.fmu", platforms=["aarch64-darwin"]))
+    assert struct.unpack_from("<2I", data["darwin64/Oscillator.dylib"]) == (0xFEEDFACF, MACH_CPU["aarch64"])
+
+
+@pytest.mark.long  # the very first link for Windows builds its C library: more than a minute
+@pytest.mark.parametrize(("version", "folder"), [("2.0", "win64"), ("3.0", "x86_64-windows")])
+def test_windows(tmp_path: Path, version: str, folder: str) -> None:
+    path = export(Oscillator(), tmp_path / "o.fmu", platforms=["x86_64-windows"], fmi_version=version)
+    data = binaries(path)[f"{folder}/Oscillator.dll"]
+    (place,) = struct.unpack_from("<I", data, 0x3C)
+    assert data[:2] == b"MZ"
+    assert data[place : place + 4] == b"PE\0\0"
+    assert struct.unpack_from("<H", data, place + 4)[0] == 0x8664
+    assert f"fmi{version[0]}DoStep".encode() in data
+    assert b"kernel_advance" not in data
+
+
+def test_export_repeats_byte_for_byte_and_the_second_one_is_fast(tmp_path: Path) -> None:
+    """With a cache that knows the library an export takes about 0.1 s here; a second is a slow machine."""
+    first = export(Oscillator(), tmp_path / "1.fmu").read_bytes()
+    begin = time.perf_counter()
+    second = export(Oscillator(), tmp_path / "2.fmu").read_bytes()
+    assert time.perf_counter() - begin < 1.0
+    assert hashlib.sha256(first).digest() == hashlib.sha256(second).digest()
+
+
+def test_another_parameter_is_another_fmu(tmp_path: Path, host_of: Callable[[str], Host]) -> None:
+    h = host_of("oscillator")
+    other = export(Oscillator(m=2.0), tmp_path / "2.fmu")
+    assert Host(other, h.library).guid != h.guid
+
+
+def test_no_path_of_this_machine_is_inside(tmp_path: Path) -> None:
+    (library,) = binaries(export(Oscillator(), tmp_path / "o.fmu")).values()
+    for path in (Path(fmus.export.link.__file__).parent, Path.home(), cache_directory()):
+        assert str(path).encode() not in library
+
+
+IR = """
+declare double @sin(double)
+declare double @llvm.fabs.f64(double)
+declare ptr @{symbol}(i64)
+define void @helper() {{
+  %p = call ptr @{symbol}(i64 8)
+  ret void
+}}
+define i32 @kernel_outputs(ptr %r, double %t, double %h) {{
+  call void @helper()
+  ret i32 0
+}}
+define i32 @kernel_derivatives(ptr %r, double %t, double %h) {{
+  %s = call double @sin(double %t)
+  ret i32 0
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("symbol", "remedy"),
+    [
+        ("NRT_Allocate", "declared Local"),
+        ("PyErr_Format", "Python runtime"),
+        ("mystery", "only functions of libm"),
+    ],
+)
+def test_a_symbol_that_is_not_there_is_named_with_its_kernel(symbol: str, remedy: str) -> None:
+    with pytest.raises(ExportError, match=f"Plant: kernel outputs needs '{symbol}'.*{remedy}"):
+        check_symbols(IR.format(symbol=symbol), "Plant")
+
+
+def test_libm_and_intrinsics_are_there() -> None:
+    check_symbols(IR.format(symbol="hypot"), "Plant")
+
+
+def test_a_missing_compiler_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda n, *a: None if n == "ziglang" else find(n, *a))
+    with pytest.raises(CompilationError, match="pip install ziglang"):
+        export(Oscillator(), tmp_path / "o.fmu")
+
+
+def test_what_the_compiler_says_reaches_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fmus.export.link, "_table", lambda *_: "this is no C\n")
+    with pytest.raises(ExportError, match=r"Oscillator cannot be linked for .*: .*error"):
+        export(Oscillator(), tmp_path / "o.fmu")
+
+
+@pytest.mark.parametrize("version", FMI_VERSIONS)
+def test_the_front_end_compiles_without_a_warning(tmp_path: Path, version: str) -> None:
+    plant = Accumulator(m=2, n=3)
+    model = build_model(plant, "Accumulator", version, "")
+    (tmp_path / "model.c").write_text(fmus.export.link._unit(model))
+    (tmp_path / "start.bin").write_bytes(model.start)
+    flags = [flag for flag in fmus.export.link._FLAGS if flag not in ("-s", "-shared")]
+    flags += [f"-I{fmi_headers()}", f"-I{fmus.export.link._FRONT_END}", f"--embed-dir={tmp_path}"]
+    command = [sys.executable, "-m", "ziglang", "cc", *flags, "-Wshadow", "-Werror", "-c", "model.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+class Gate(Block):
+    """Gives up when u is above 5"""
+
+    u = Input()
+    y = Output()
+
+    def step(self, t: float, h: float) -> None:
+        self.y = self.u
+
+
+GATE = """
+define i32 @kernel_step(ptr %r, double %t, double %h) {
+  %u = load double, ptr %r
+  %open = fcmp ogt double %u, 5.0
+  %code = select i1 %open, i32 7, i32 0
+  ret i32 %code
+}
+"""
+
+
+def test_a_kernel_that_gives_up_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fmus.export.fmu, "lower", lambda participant: GATE)
+    path = export(Gate(), tmp_path / "gate.fmu")
+    library = tmp_path / "Gate.so"
+    library.write_bytes(next(iter(binaries(path).values())))
+    h = Host(path, ctypes.CDLL(str(library)))
+    h.setup()
+    h.log.clear()
+    assert h.set(("u", 6.0)) == OK
+    assert h.step(0.0, 0.5) == ERROR
+    assert h.log == [
+        (ERROR, "logStatusError", "fmi2DoStep: the model gave up in the step from t = 0 (code 7)")
+    ]
+    h.free()
