@@ -25,7 +25,9 @@ from controllers.laws.sliding_surface import SlidingSurface
 from cosim import FMU, System, simulate
 from cosim.blocks import LowPass, SensorDynamics
 from fmus.export import as_fmu
+from fmus.packaging.other_tools import ecospy
 from fmus.plants.oscillator import Oscillator
+from tests.others import tool
 
 N = 1_000_000
 H = 0.01
@@ -127,14 +129,13 @@ def test_against_fmpy_calls(plant, ours, record_property):
 
 
 def test_against_ecos(plant, ours, tmp_path, record_property):
-    from ecospy import EcosSimulation, EcosSimulationStructure
-
+    ecos = tool(ecospy)
     n = 20_000
     files = {"plant": plant.path}
     for name, block in blocks().items():
         files[name] = tmp_path / f"{name}.fmu"
         shutil.copy(as_fmu(block).path, files[name])
-    structure = EcosSimulationStructure()
+    structure = ecos.EcosSimulationStructure()
     for name, path in files.items():
         structure.add_model(name, str(path))
     for source, target in CONNECTIONS:
@@ -145,7 +146,7 @@ def test_against_ecos(plant, ours, tmp_path, record_property):
             for end in (source, target)
         ]
         structure.make_real_connection(*names)
-    with EcosSimulation(H, structure=structure) as simulation:
+    with ecos.EcosSimulation(H, structure=structure) as simulation:
         simulation.init()
         began = time.perf_counter()
         simulation.step(n)
