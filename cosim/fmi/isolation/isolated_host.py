@@ -1,9 +1,9 @@
-"""The process of an isolated FMU: loads its library and makes the calls that come through shared memory.
+"""The process of an isolated FMU, which loads its library and makes the calls from shared memory.
 
     python isolated_host.py MEMORY SIZE SUPPORT LIBRARY
 
-It needs the standard library only, so that it starts in hundredths of a second, and is run
-as a file: the package would bring NumPy. isolation.py starts and ends it.
+It needs the standard library only, so that it starts within hundredths of a second, and is run
+as a file because the package would load NumPy. isolation.py starts and ends it.
 """
 
 import ctypes
@@ -17,10 +17,10 @@ from pathlib import Path
 
 
 def end_with_parent() -> None:
-    """End when the other end of standard input is closed: the parent has ended, however it did."""
+    """End when the other end of standard input is closed, because then the parent has ended."""
     lifeline = os.dup(0)
     nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)  # what an FMU reads from
+    os.dup2(nothing, 0)  # the standard input of the FMU
     os.close(nothing)
 
     def wait() -> None:
@@ -32,7 +32,7 @@ def end_with_parent() -> None:
 
 def main(handle: str, size: int, support_path: str, library: Path) -> None:
     """Serve one instance of an FMU."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both processes; the parent handles it
     end_with_parent()
     if sys.platform == "win32":
         memory = mmap.mmap(-1, size, tagname=handle)
@@ -43,7 +43,7 @@ def main(handle: str, size: int, support_path: str, library: Path) -> None:
     support.function_name.restype = ctypes.c_char_p
     support.host_ready.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_char_p)
     try:
-        with chdir(library.parent):  # where FMPy loads it, too
+        with chdir(library.parent):  # as FMPy does
             fmu = ctypes.CDLL(str(library))
     except OSError as error:
         support.host_ready(address, size, str(error).encode())

@@ -1,12 +1,12 @@
-"""An FMU in a process of its own: what crashes there is an error here.
+"""An FMU in a process of its own: a crash there becomes an error here.
 
-    FMUInstance --addresses--> functions of FMI (c/fmi2.c, c/fmi3.c)   this process
+    FMUInstance --addresses--> functions of FMI (functions.py, c/caller.c)   this process
                                   | shared memory (c/channel.h)
-    the FMU's library <-------- c/host.c, isolated_host.py             its process
+    the FMU's library <-------- c/host.c, isolated_host.py                   its process
 
 The functions have the names and signatures of FMI, so that FMPy and the loop call them as
-they call an FMU's. A process serves one instance. It ends with its instance, or when this
-process ends; the memory has no name and is gone with the two.
+they call those of an FMU. A process serves one instance. It ends with its instance, or when this
+process ends. The memory has no name, so that it is freed with the two processes.
 """
 
 from __future__ import annotations
@@ -38,36 +38,50 @@ from ...codegen.c_compiler import (
 from ...codegen.kernels import cache_directory
 from ...errors import CompilationError, FMUError
 from ...loop.signals import Failures
+from .functions import sources as generated_sources
 
 _SOURCES = Path(__file__).parent / "c"
 _HOST = Path(__file__).parent / "isolated_host.py"
-_SIZE = 1 << 28  # bytes of shared memory; what is never touched costs nothing
-_FAREWELL = 2.0  # s, for the FMU's library to end what it began
+_SIZE = 1 << 28  # bytes of shared memory; pages that are never touched cost nothing
+_FAREWELL = 2.0  # s that the FMU's library has to finish its work
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
 _EXCEPTIONS = {0xC0000005: "access violation", 0xC00000FD: "stack overflow"}  # of Windows
 
 
 @lru_cache(maxsize=1)
 def support_library() -> Path:
-    """Return the library with the functions of FMI and the host's side; compiled where it is new."""
+    """Return the library with both sides of the channel, compiled if it is not in the cache."""
     if host() not in PLATFORMS:
-        raise CompilationError(f"an FMU cannot be isolated on {host()} (but on {', '.join(PLATFORMS)})")
+        raise CompilationError(
+            f"an FMU cannot be isolated on {host()}; leave isolated=True away, or use one of "
+            f"{', '.join(PLATFORMS)}"
+        )
     platform = PLATFORMS[host()]
-    sources = sorted(_SOURCES.glob("*.c"))
-    texts = [
-        p.read_text() for p in sorted([*sources, *_SOURCES.glob("*.h"), *fmi_headers().glob("fmi[23]*.h")])
-    ]
+    files = sorted([*_SOURCES.glob("*.[ch]"), *fmi_headers().glob("fmi[23]*.h")])
+    texts = [*(p.read_text() for p in files), *generated_sources().values()]
 
     def build() -> bytes:
         with tempfile.TemporaryDirectory(dir=cache_directory()) as name:
-            library = Path(name) / f"isolation{platform.suffix}"
-            target = ["-target", platform.target, *LIBRARY_FLAGS, f"-I{fmi_headers()}"]
-            done = zig_cc([*target, *sources, "-o", library], Path(name))
+            done, library = compile_support(Path(name))
             if done.returncode or not library.exists():
-                raise CompilationError(f"what isolates an FMU cannot be compiled: {complaint(done.stderr)}")
+                raise CompilationError(
+                    f"the library that isolates an FMU cannot be compiled: {complaint(done.stderr)}"
+                )
             return library.read_bytes()
 
     return cached_library([platform.target, *LIBRARY_FLAGS, *texts], platform.suffix, build).resolve()
+
+
+def compile_support(folder: Path, *flags: str) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """Compile the library in a folder; return what the compiler reports, and the library's path."""
+    platform = PLATFORMS[host()]
+    for name, text in generated_sources().items():
+        (folder / name).write_text(text, encoding="utf-8")
+    library = folder / f"isolation{platform.suffix}"
+    paths = [f"-I{each}" for each in (folder, _SOURCES, fmi_headers())]
+    sources = [*sorted(_SOURCES.glob("*.c")), folder / "functions.c"]
+    target = ["-target", platform.target, *LIBRARY_FLAGS, *flags, *paths]
+    return zig_cc([*target, *sources, "-o", library], folder), library
 
 
 @lru_cache(maxsize=1)
@@ -88,16 +102,16 @@ def _support() -> Any:
 class Isolation:
     """The process of one instance of an FMU, which has loaded the FMU's library.
 
-    The next instance that FMPy makes in this thread through `support_library()` is its.
-    Raises FMUError where the library cannot be loaded.
+    The next instance that FMPy makes in this thread through `support_library()` runs in it.
+    Raises FMUError if the library cannot be loaded.
     """
 
     def __init__(self, name: str, library: Path, failures: Failures) -> None:
         self.name = name
         self.failures = failures
-        #: how the process ended when it should not have, or ""
+        #: how the process ended unexpectedly, or ""
         self.crash = ""
-        #: no call is possible any more: the process ended, or Ctrl-C came while it was waited for
+        #: whether no call is possible any more: the process ended, or Ctrl-C came during a call
         self.is_gone = False
         self._support = _support()
         self._memory, handle, inherited = _shared_memory()
@@ -107,7 +121,7 @@ class Isolation:
         finally:
             for file in inherited:
                 os.close(file)
-        self._end = weakref.finalize(self, _end, self._process)  # of an instance that nobody stopped
+        self._end = weakref.finalize(self, _end, self._process)  # for an instance that is never stopped
         self._look = _LOOK(self._interrupted_or_ended)
         address = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
         self._caller = self._support.caller_open(address, _SIZE, self._look)
@@ -118,7 +132,7 @@ class Isolation:
             raise FMUError(reason)
 
     def _interrupted_or_ended(self, _: int, t: float, h: float) -> int:
-        """Tell whether waiting for the process is over; asked a few times a second."""
+        """Return whether waiting for the process is over; called a few times a second."""
         try:
             if self.failures.interrupted:
                 raise KeyboardInterrupt
@@ -127,7 +141,7 @@ class Isolation:
                 self.crash = self._ending(code)
                 self.is_gone = True
             return int(self.is_gone)
-        except BaseException as exception:  # Ctrl-C, where nobody notes it
+        except BaseException as exception:  # Ctrl-C, which C code cannot raise
             self.is_gone = True
             self.failures.exception, self.failures.participant, self.failures.time = exception, self.name, t
             return 1
@@ -146,12 +160,12 @@ class Isolation:
         return f"{how}{where}" + ("" if math.isnan(time) else f" at t = {time:g} s")
 
     def raise_interrupted(self) -> None:
-        """Raise Ctrl-C if that is why a call failed."""
+        """Raise KeyboardInterrupt if a call failed because of Ctrl-C."""
         if isinstance(self.failures.exception, KeyboardInterrupt):
             raise self.failures.exception
 
     def close(self) -> None:
-        """End the process; no function of the instance may be called any more."""
+        """End the process; no function of the instance may be called after that."""
         if self._support.caller_stop(self._caller):
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(_FAREWELL)
@@ -168,7 +182,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _shared_memory() -> tuple[mmap.mmap, str, list[int]]:
-    """Return memory, how the other process finds it, and the files that it inherits for that."""
+    """Return the memory, the handle by which the host finds it, and the files that the host inherits."""
     if sys.platform == "win32":
         tag = f"structcosim-{uuid.uuid4()}"
         return mmap.mmap(-1, _SIZE, tagname=tag), tag, []

@@ -17,11 +17,13 @@ struct following {
 struct remote {
     struct channel *channel;
     size_t capacity;                           /* bytes of channel->data */
-    int32_t (*check)(int64_t, double, double); /* not 0 when waiting is over: it died, or Ctrl-C */
+    int32_t (*check)(int64_t, double, double); /* not 0 when waiting is over: a crash, or Ctrl-C */
     bool ended;
-    uint32_t number; /* of the last request */
-    int waiting;     /* calls that are not sent yet */
-    double begin, end; /* of the last step, or the time that was set */
+    uint32_t number;              /* of the last request */
+    int waiting, sent;            /* calls that are not sent yet, and calls in the last request */
+    size_t used;                  /* bytes of channel->data that their arguments take */
+    struct call calls[MAX_CALLS]; /* the calls as they were packed, which the host cannot change */
+    double begin, end;            /* of the last step, or the time that was set */
     struct following following[MAX_FOLLOWING];
     int n_following;
     caller_log *log;
@@ -31,16 +33,6 @@ struct remote {
 static _Thread_local struct remote *next;
 
 /* ------------------------------------------------------------------ from Python */
-
-EXPORT const char *function_name(int function)
-{
-    static const char *const names[] = {
-#define X(name) #name,
-        FUNCTIONS
-#undef X
-    };
-    return function >= 0 && function < N_FUNCTIONS ? names[function] : NULL;
-}
 
 EXPORT struct remote *caller_open(void *memory, size_t bytes, int32_t (*check)(int64_t, double, double))
 {
@@ -56,19 +48,33 @@ EXPORT struct remote *caller_open(void *memory, size_t bytes, int32_t (*check)(i
 
 EXPORT void caller_close(struct remote *r) { free(r); }
 
-/* Return the function that the host calls, or called last; -1 before it called any. */
-EXPORT int caller_function(struct remote *r)
+/* Return how many calls of the last request were made, the failed one and the present one included. */
+static int made(struct remote *r)
 {
     const int done = atomic_load(&r->channel->done);
-    return done > 0 ? r->channel->calls[done - 1].function : -1;
+    return done < 0 ? 0 : done > r->sent ? r->sent : done;
 }
 
-/* Return the time at which it does: before the end of a step that is still to be made, or in it, its begin. */
+/* Return the status of a call of the last request; one that FMI does not define counts as an error. */
+static int status_of(const struct remote *r, int index)
+{
+    const int status = index >= 0 ? r->channel->calls[index].status : STATUS_FATAL;
+    return status >= 0 && status <= STATUS_PENDING ? status : STATUS_ERROR;
+}
+
+/* Return the function that the host is calling, or called last; -1 before it called any. */
+EXPORT int caller_function(struct remote *r)
+{
+    const int done = made(r);
+    return done > 0 ? r->calls[done - 1].function : -1;
+}
+
+/* Return the time of that call: the beginning of its step if it is a step or follows one in the same
+   request, otherwise the end. */
 EXPORT double caller_time(struct remote *r)
 {
-    const struct channel *c = r->channel;
-    for (int i = atomic_load(&c->done) - 1; i >= 0 && i < c->n; i++)
-        if (c->calls[i].function == F_fmi2DoStep || c->calls[i].function == F_fmi3DoStep)
+    for (int i = made(r) - 1; i >= 0 && i < r->sent; i++)
+        if (r->calls[i].function == F_fmi2DoStep || r->calls[i].function == F_fmi3DoStep)
             return r->begin;
     return r->end;
 }
@@ -85,7 +91,8 @@ static void pass_on_log(struct remote *r)
 {
     struct channel *c = r->channel;
     while (atomic_load(&c->read) != atomic_load(&c->logged)) {
-        const struct log_line *line = &c->lines[atomic_load(&c->read) % LOG_LINES];
+        struct log_line *line = &c->lines[atomic_load(&c->read) % LOG_LINES];
+        line->category[sizeof line->category - 1] = line->text[sizeof line->text - 1] = '\0';
         if (r->log != NULL)
             r->log(r, line->status, line->category, line->text);
         atomic_fetch_add(&c->read, 1);
@@ -100,7 +107,7 @@ static bool answered(struct remote *r)
     while (!channel_wait(&c->answer, r->number, &c->caller)) {
         pass_on_log(r);
         if (r->check(0, r->end, 0.0) != 0) {
-            pass_on_log(r); /* what it said last */
+            pass_on_log(r); /* the last lines before the end */
             r->ended = true;
             return false;
         }
@@ -109,27 +116,35 @@ static bool answered(struct remote *r)
     return true;
 }
 
-static bool send(struct remote *r)
+/* Send the waiting calls; return the status of the last one that was made, which is the failed one if
+   any failed: the host stops there. */
+static int send(struct remote *r)
 {
     struct channel *c = r->channel;
     for (int i = 0; i < r->n_following; i++)
         r->following[i].index = -1;
-    c->n = r->waiting;
+    c->n = r->sent = r->waiting;
+    c->used = r->used;
     r->waiting = 0;
     channel_post(&c->request, ++r->number, &c->host);
-    return answered(r);
+    return answered(r) ? status_of(r, made(r) - 1) : STATUS_FATAL;
 }
 
-/* Wait until the host has loaded the FMU; return 0, or not 0 where it could not, and the reason. */
+/* Wait until the host has loaded the FMU; return 0, or another number if it could not. */
 EXPORT int caller_await(struct remote *r)
 {
     r->number = 1;
     return answered(r) ? r->channel->calls[0].status : STATUS_FATAL;
 }
 
-EXPORT const char *caller_reason(struct remote *r) { return (const char *)r->channel->data; }
+/* Return the reason why it could not. */
+EXPORT const char *caller_reason(struct remote *r)
+{
+    r->channel->data[r->capacity - 1] = '\0';
+    return (const char *)r->channel->data;
+}
 
-/* Ask the host to end, without waiting for it; tell whether it listens. */
+/* Ask the host to end, without waiting for it; return whether it can hear that. */
 EXPORT bool caller_stop(struct remote *r)
 {
     if (r->ended)
@@ -145,132 +160,148 @@ EXPORT bool caller_stop(struct remote *r)
 static size_t size_of(const struct argument *a, size_t i)
 {
     const char *const *texts = a->values;
-    return a->sizes != NULL ? a->sizes[i] : texts[i] != NULL ? strlen(texts[i]) + 1 : 0;
+    return texts[i] == NULL ? 0 : a->sizes != NULL ? a->sizes[i] : strlen(texts[i]) + 1;
 }
 
 static size_t room(const struct argument *a)
 {
+    if (a->kind == WORD || a->values == NULL)
+        return 0;
     if (a->kind == BLOCK)
         return aligned(a->n * a->size);
-    size_t bytes = a->kind == WORD ? 0 : aligned(8 * a->n);
+    size_t bytes = aligned(8 * a->n);
     for (size_t i = 0; a->kind == POINTERS && i < a->n; i++)
         bytes += aligned(size_of(a, i));
     return bytes;
 }
 
-/* Write an argument to data from `used` on. What comes out goes in as well: a function that fails may
-   leave it as it was. */
-static void pack(unsigned char *data, size_t used, const struct argument *a, struct slot *s)
+/* Write an argument to data from `used` on. A block that comes out goes in as well, since a function
+   that fails may leave it as it was. */
+static struct slot packed(unsigned char *data, size_t used, const struct argument *a)
 {
-    *s = (struct slot){a->kind, (uint32_t)a->n, a->kind == WORD ? a->word : a->values != NULL ? used : 0};
-    if (a->kind == BLOCK && a->values != NULL)
+    if (a->kind == WORD)
+        return (struct slot){WORD, 0, a->word};
+    if (a->values == NULL)
+        return (struct slot){a->kind, 0, 0};
+    if (a->kind == BLOCK)
         memcpy(data + used, a->values, a->n * a->size);
     if (a->kind == TEXTS_OUT || a->kind == BLOBS_OUT)
         memset(data + used, 0, 8 * a->n);
-    if (a->kind != POINTERS)
-        return;
-    uint64_t *places = (uint64_t *)(data + used);
     const void *const *values = a->values;
-    used += aligned(8 * a->n);
-    for (size_t i = 0; i < a->n; i++) {
+    uint64_t *places = (uint64_t *)(data + used);
+    size_t at = used + aligned(8 * a->n);
+    for (size_t i = 0; a->kind == POINTERS && i < a->n; i++) {
         const size_t size = size_of(a, i);
-        places[i] = values[i] != NULL ? used : 0;
+        places[i] = values[i] != NULL ? at : 0;
         if (values[i] != NULL)
-            memcpy(data + used, values[i], size);
-        used += aligned(size);
+            memcpy(data + at, values[i], size);
+        at += aligned(size);
     }
+    return (struct slot){a->kind, (uint32_t)a->n, used};
 }
 
-/* Copy back what came out; strings and binaries stay in data until the next call, as FMI lets them. */
-static void unpack(unsigned char *data, const struct argument *a, const struct slot *s, int status)
+/* Copy back a block that came out; strings and binary data stay in the channel until the next call. */
+static void unpack(const struct remote *r, const struct argument *a, const struct slot *s, bool failed)
 {
+    unsigned char *data = r->channel->data;
     if (!a->out || a->values == NULL)
         return;
     if (a->kind == BLOCK) {
         memcpy((void *)a->values, data + s->word, a->n * a->size);
         return;
     }
+    data[r->capacity - 1] = '\0'; /* every string ends */
     const uint64_t *places = (const uint64_t *)(data + s->word);
-    for (size_t i = 0; status <= STATUS_WARNING && i < a->n; i++)
-        ((const void **)a->values)[i] = places[i] != 0 ? data + places[i] : NULL;
+    for (size_t i = 0; !failed && i < a->n; i++)
+        ((const void **)a->values)[i] = places[i] != 0 && places[i] < r->capacity ? data + places[i] : NULL;
 }
 
 /* ------------------------------------------------------------------------ calls */
 
-/* Add a call to the next request; return its index, or -1 where it does not fit. */
+/* Add a call to the next request; return its index, or minus the status of a failure: the call does not
+   fit, or those that had to be sent before it failed. */
 static int add(struct remote *r, enum function function, const struct argument *arguments, int n)
 {
-    struct channel *c = r->channel;
-    size_t used = r->waiting == 0 ? 16 : c->used; /* 0 is NULL */
     size_t bytes = 0;
     for (int i = 0; i < n; i++)
         bytes += room(&arguments[i]);
-    if (r->waiting == MAX_CALLS || bytes > r->capacity - used) {
-        if (r->waiting != 0)
-            return send(r) && c->calls[c->n - 1].status <= STATUS_WARNING ? add(r, function, arguments, n) : -1;
+    if (r->waiting == 0)
+        r->used = 16; /* place 0 is NULL */
+    if (r->waiting == MAX_CALLS || bytes > r->capacity - r->used) {
+        if (r->waiting != 0) {
+            const int status = send(r);
+            return succeeded(status) ? add(r, function, arguments, n) : -status;
+        }
         char text[120];
         snprintf(text, sizeof text, "%s passes more than the %zu MB that an isolated FMU has room for",
                  function_name(function), r->capacity >> 20);
         caller_say(r, text);
-        return -1;
+        return -STATUS_ERROR;
     }
-    struct call *call = &c->calls[r->waiting];
+    struct call *call = &r->calls[r->waiting];
     call->function = function;
     call->n = n;
     for (int i = 0; i < n; i++) {
-        pack(c->data, used, &arguments[i], &call->arguments[i]);
-        used += room(&arguments[i]);
+        call->arguments[i] = packed(r->channel->data, r->used, &arguments[i]);
+        r->used += room(&arguments[i]);
     }
-    c->used = used;
+    struct call *shared = &r->channel->calls[r->waiting];
+    memcpy(shared, call, offsetof(struct call, arguments) + (size_t)n * sizeof call->arguments[0]);
     return r->waiting++;
 }
 
-/* Take over what a call of the last request brought; return its status, or that of a call before which failed. */
+/* Take over the results of a call of the last request; return its status, or that of an earlier call
+   that failed. */
 static int take(struct remote *r, int index, const struct argument *arguments)
 {
-    struct channel *c = r->channel;
-    const int done = atomic_load(&c->done);
-    if (index >= done)
-        return c->calls[done - 1].status;
-    const struct call *call = &c->calls[index];
+    if (index >= made(r))
+        return status_of(r, made(r) - 1);
+    const struct call *call = &r->calls[index];
+    const int status = status_of(r, index);
     for (int i = 0; i < call->n; i++)
-        unpack(c->data, &arguments[i], &call->arguments[i], call->status);
-    return call->status;
+        unpack(r, &arguments[i], &call->arguments[i], !succeeded(status));
+    return status;
 }
+
+/* Return the status of a call that cannot be made, or 0. */
+static int refused(const struct remote *r) { return r == NULL ? STATUS_ERROR : r->ended ? STATUS_FATAL : 0; }
 
 int caller_call(struct remote *r, enum function function, const struct argument *arguments, int n)
 {
-    if (r->ended)
-        return STATUS_FATAL;
+    if (refused(r))
+        return refused(r);
     const int index = add(r, function, arguments, n);
-    if (index < 0 || !send(r))
-        return r->ended ? STATUS_FATAL : STATUS_ERROR;
-    return take(r, index, arguments);
+    if (index < 0)
+        return -index;
+    send(r);
+    return r->ended ? STATUS_FATAL : take(r, index, arguments);
 }
 
 int caller_post(struct remote *r, enum function function, const struct argument *arguments, int n)
 {
-    if (r->ended)
-        return STATUS_FATAL;
-    return add(r, function, arguments, n) < 0 ? r->ended ? STATUS_FATAL : STATUS_ERROR : 0;
+    if (refused(r))
+        return refused(r);
+    const int index = add(r, function, arguments, n);
+    return index < 0 ? -index : 0;
 }
 
 int caller_step(struct remote *r, enum function function, const struct argument *arguments, int n)
 {
+    if (refused(r))
+        return refused(r);
     int indices[MAX_FOLLOWING];
-    if (r->ended)
-        return STATUS_FATAL;
     if (r->waiting + 1 + r->n_following > MAX_CALLS)
         r->n_following = 0;
     const int index = add(r, function, arguments, n);
     if (index < 0)
-        return r->ended ? STATUS_FATAL : STATUS_ERROR;
+        return -index;
     for (int i = 0; i < r->n_following; i++)
         indices[i] = add(r, r->following[i].function, r->following[i].arguments, r->following[i].n);
-    if (!send(r))
+    send(r);
+    if (r->ended)
         return STATUS_FATAL;
     for (int i = 0; i < r->n_following; i++)
-        r->following[i].index = indices[i] < atomic_load(&r->channel->done) ? indices[i] : -1;
+        r->following[i].index = indices[i] < made(r) ? indices[i] : -1;
     return take(r, index, arguments);
 }
 
@@ -284,10 +315,12 @@ static bool is_same(const struct argument *a, const struct argument *b, int n)
 
 int caller_get(struct remote *r, enum function function, const struct argument *arguments, int n)
 {
+    if (refused(r))
+        return refused(r);
     struct following *f = r->following, *const end = f + r->n_following;
     while (f < end && (f->function != function || !is_same(f->arguments, arguments, n)))
         f++;
-    if (f < end && f->index >= 0 && r->waiting == 0 && !r->ended)
+    if (f < end && f->index >= 0 && r->waiting == 0)
         return take(r, f->index, arguments);
     if (f == end && r->n_following < MAX_FOLLOWING) {
         *f = (struct following){.function = function, .n = n, .index = -1};
@@ -301,8 +334,10 @@ int caller_get(struct remote *r, enum function function, const struct argument *
 
 struct remote *caller_at(struct remote *r, double begin, double end)
 {
-    r->begin = begin;
-    r->end = end;
+    if (r != NULL) {
+        r->begin = begin;
+        r->end = end;
+    }
     return r;
 }
 

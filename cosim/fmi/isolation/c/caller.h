@@ -1,26 +1,37 @@
-/* The functions of FMI as this process sees them: each packs its arguments for the host.
+/* The caller's side of an isolated FMU: each function of FMI packs its arguments for the host.
 
-   A function of FMI may be there twice. What the loop of a run calls has `loop_` before its name
-   and spares it waiting, as each answer of another process takes microseconds:
+   A function of FMI may exist twice. The loop of a run calls the one with `loop_` before its name,
+   which saves a wait, as every answer of another process takes microseconds:
 
-       loop_...Set...      is sent with the next call that has an answer, and its failure reported there
-       loop_...DoStep      asks for the outputs at once that the loop got after the step before
-       loop_...Get...      takes them from there
+       loop_...Set...      is sent with the next call that has an answer, which reports its failure
+       loop_...DoStep      also asks for the outputs that the loop got after the step before
+       loop_...Get...      takes its values from that answer
 
-   So the FMU sees the same calls in the same order, and a step has one answer. */
+   The FMU sees the same calls in the same order, and a step has one answer.
+
+   Contract of the arrays. A call reads and writes the caller's arrays before it returns, and keeps
+   none of them. There is one exception: loop_...Get... remembers the addresses of its arrays, and
+   every later loop_...DoStep reads the value references and the former values again. An importer that
+   calls loop_...Get... keeps these arrays in place, with the same length, until it frees the instance.
+   Strings and binary data that come out stay valid until the next call, as FMI says.
+
+   An instance that is NULL is answered with an error status, or ignored where it is freed; an array
+   that is NULL reaches the FMU as NULL. The host's process may be damaged by the FMU, so its answers
+   are checked before they are used: only statuses, lines of the log and the contents of blocks are
+   taken from shared memory, never the place or length of a block. */
 
 #ifndef CALLER_H
 #define CALLER_H
 
 #include "channel.h"
 
-/* An isolated instance: what the functions here take for the FMU's component. */
+/* An isolated instance, which the importer has as the FMU's component. */
 struct remote;
 
 struct argument {
     enum kind kind;
     bool out;           /* the block is copied back */
-    const void *values; /* of blocks, strings, binaries */
+    const void *values; /* of blocks, strings, binary data; may be NULL */
     const size_t *sizes;
     size_t n, size;
     uint64_t word;
@@ -33,28 +44,24 @@ struct argument {
 #define OUT(p, count) {.kind = BLOCK, .out = true, .values = (p), .n = (count), .size = sizeof *(p)}
 #define TEXT(p) {.kind = BLOCK, .values = (p), .n = (p) != NULL ? strlen(p) + 1 : 0, .size = 1}
 #define TEXTS(p, count) {.kind = POINTERS, .values = (p), .n = (count)}
-#define BLOBS(p, lengths, count) {.kind = POINTERS, .values = (p), .sizes = (lengths), .n = (count)}
+#define BLOBS(p, lengths, count) \
+    {.kind = POINTERS, .values = (lengths) != NULL ? (p) : NULL, .sizes = (lengths), .n = (count)}
 #define OUT_TEXTS(p, count) {.kind = TEXTS_OUT, .out = true, .values = (p), .n = (count)}
 #define OUT_BLOBS(p, count) {.kind = BLOBS_OUT, .out = true, .values = (p), .n = (count)}
 
 typedef int caller_how(struct remote *r, enum function function, const struct argument *arguments, int n);
 
-/* Make a call and wait for it, CALL(instance, function, arguments ...); or as the loop does. */
+/* Make a call and wait for its answer; or defer it, step, or get as described above. */
 caller_how caller_call, caller_post, caller_step, caller_get;
-#define VIA(how, instance, name, ...) \
-    how(instance, F_##name, (struct argument[]){__VA_ARGS__}, \
-        sizeof((struct argument[]){__VA_ARGS__}) / sizeof(struct argument))
-#define CALL(...) VIA(caller_call, __VA_ARGS__)
-#define POST(...) VIA(caller_post, __VA_ARGS__)
-#define STEP(...) VIA(caller_step, __VA_ARGS__)
-#define GET(...) VIA(caller_get, __VA_ARGS__)
-#define CALL_PLAIN(instance, name) caller_call(instance, F_##name, NULL, 0)
+#define CALL(r, name, ...) \
+    caller_call(r, F_##name, (struct argument[]){__VA_ARGS__}, \
+                sizeof((struct argument[]){__VA_ARGS__}) / sizeof(struct argument))
 
-/* Keep the time that the instance is told, of a step its begin and end, for the message if it crashes;
-   return the instance. */
+/* Keep the time of the call, of a step its beginning and end, for the message of a crash; return the
+   instance. */
 struct remote *caller_at(struct remote *r, double begin, double end);
 
-/* Return the instance that is about to be made in this thread, and keep where its log goes. */
+/* Return the instance that this thread is about to make, or NULL, and keep where its log goes. */
 typedef void caller_log(struct remote *r, int status, const char *category, const char *text);
 struct remote *caller_begin(caller_log *log, void *environment, void *function);
 void *caller_environment(struct remote *r);

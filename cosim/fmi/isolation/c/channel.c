@@ -1,11 +1,12 @@
-/* Waiting for the other process: watch the word, as the answer mostly comes at once, then sleep.
+/* Waiting for the other process: spin on the word, because the answer mostly comes at once, then sleep.
 
-   Sleeping lets the other process run where all cores are busy, and watching in vain keeps it from
-   running; but to be woken costs more than all the rest where a core is free. So who watched long in
-   vain watches shortly the next times, until it sees the other one answer without sleeping, which
-   then runs beside it. Now and then it watches long again, because a core may have become free: soon
-   at first, and ever more seldom while it is in vain. Linux wakes the sleeper through a futex;
-   elsewhere there is nothing of that kind between processes, and it looks again after growing pauses. */
+   Sleeping lets the other process run where all cores are busy, and spinning keeps it from running;
+   but where a core is free, being woken costs more than everything else. So a long spin that timed
+   out shortens the next ones, until a short one sees the answer come: then the other process runs on
+   a core of its own. A long spin is tried again now and then, because a core may have become free:
+   soon at first, and ever more rarely while it times out. Linux wakes the sleeper through a futex.
+   Other systems offer no such call between processes; there the sleeper looks again after growing
+   pauses. */
 
 #if defined __linux__
 #define _GNU_SOURCE /* syscall */
@@ -22,9 +23,9 @@
 #endif
 
 enum {
-    LONG_WATCH = 50000, /* ns */
-    SHORT_WATCH = 300,
-    TRY_SOON = 16, /* waits until the next long watch */
+    LONG_SPIN = 50000, /* ns */
+    SHORT_SPIN = 300,
+    TRY_SOON = 16, /* short spins until the next long one */
     TRY_SELDOM = 1024,
     LONGEST_SLEEP = 50000000,
 };
@@ -56,12 +57,12 @@ void channel_wake(_Atomic uint32_t *word)
 
 void channel_post(_Atomic uint32_t *word, uint32_t number, struct waiting *other)
 {
-    atomic_store(word, number); /* sequentially consistent with `sleeps`: one of both sees the other */
+    atomic_store(word, number); /* sequentially consistent with `sleeps`: one of the two sees the other */
     if (atomic_load(&other->sleeps))
         channel_wake(word);
 }
 
-static bool watch(_Atomic uint32_t *word, uint32_t number, int64_t ns)
+static bool spin(_Atomic uint32_t *word, uint32_t number, int64_t ns)
 {
     const int64_t end = now() + ns;
     do {
@@ -92,7 +93,7 @@ static void sleep_until(_Atomic uint32_t *word, uint32_t number, struct waiting 
 bool channel_wait(_Atomic uint32_t *word, uint32_t number, struct waiting *self)
 {
     const bool is_long = !self->hasty || self->until_long == 0;
-    const bool came = watch(word, number, is_long ? LONG_WATCH : SHORT_WATCH);
+    const bool came = spin(word, number, is_long ? LONG_SPIN : SHORT_SPIN);
     if (came) {
         self->hasty = false;
         self->interval = TRY_SOON;

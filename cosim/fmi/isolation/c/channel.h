@@ -1,8 +1,9 @@
-/* What an isolated FMU's two processes share: some calls at a time, and the lines of the FMU's log.
+/* The memory that the two processes of an isolated FMU share: calls, and lines of the FMU's log.
 
-   The caller writes calls, then the number of the request; the host makes them, one after the
-   other until one fails, and writes each status, then the number of the answer. Blocks of values
-   lie in `data`, and the arguments say where: the memory is at another address in each process. */
+   The caller writes calls, then the number of the request. The host makes the calls one after the
+   other until one fails, writes the status of each, then the number of the answer. Blocks of values
+   lie in `data`; arguments hold their places in it, because each process has the memory at another
+   address. */
 
 #ifndef CHANNEL_H
 #define CHANNEL_H
@@ -25,17 +26,18 @@ enum {
     MAX_CALLS = 16,
     LOG_LINES = 64,
     LOG_TEXT = 2048,
-    STATUS_WARNING = 1, /* of FMI 2.0 and 3.0, as the following */
+    STATUS_WARNING = 1, /* these four of FMI 2.0 and 3.0 alike */
     STATUS_ERROR = 3,
     STATUS_FATAL = 4,
+    STATUS_PENDING = 5, /* of FMI 2.0 */
 };
 
 enum kind {
     WORD,      /* a number by value, the bits of a double too */
-    BLOCK,     /* where in data the values are; 0 is NULL */
-    POINTERS,  /* where n such places are, of strings or binaries that go in */
-    TEXTS_OUT, /* where n such places will be: strings that come out */
-    BLOBS_OUT, /* and binaries; their sizes are the argument before */
+    BLOCK,     /* the place of values in data; 0 is NULL */
+    POINTERS,  /* the place of n such places: strings or binary data that go in */
+    TEXTS_OUT, /* the place of n places that the host writes: strings that come out */
+    BLOBS_OUT, /* the same for binary data, whose sizes are the argument before */
 };
 
 struct slot {
@@ -53,11 +55,11 @@ struct log_line {
     char category[60], text[LOG_TEXT];
 };
 
-/* What one side knows about how to wait for the other. */
+/* How one side waits for the other. */
 struct waiting {
     _Atomic uint32_t sleeps;
-    uint32_t until_long, interval; /* waits in haste until the next long one, and at the beginning */
-    bool hasty;     /* watching long was in vain last time */
+    uint32_t until_long, interval; /* short spins until the next long one, and their number at first */
+    bool hasty;                    /* the last long spin timed out */
 };
 
 struct channel {
@@ -66,22 +68,26 @@ struct channel {
     uint64_t used;                         /* bytes of data */
     struct call calls[MAX_CALLS];
     _Alignas(64) _Atomic uint32_t answer;
-    _Atomic int32_t done; /* calls that were made, the failed one and the one that is being made included */
+    _Atomic int32_t done; /* calls that were made, a failed one and the present one included */
     _Alignas(64) struct waiting caller, host;
-    _Alignas(64) _Atomic uint32_t logged, read; /* lines written and read, so many in all */
+    _Alignas(64) _Atomic uint32_t logged, read; /* number of lines written, and of lines read */
     struct log_line lines[LOG_LINES];
     _Alignas(64) unsigned char data[];
 };
 
+static inline bool succeeded(int status) { return status == 0 || status == STATUS_WARNING; }
 static inline size_t aligned(size_t n) { return (n + 15) & ~(size_t)15; }
+
+/* Return the name of a function of FMI by its number in functions.h, or NULL. */
+const char *function_name(int function);
 
 /* Write the number of a request or answer, and wake the other side if it sleeps. */
 void channel_post(_Atomic uint32_t *word, uint32_t number, struct waiting *other);
 
-/* Wake who sleeps although nothing came. */
+/* Wake the side that sleeps at the word, although its number has not come. */
 void channel_wake(_Atomic uint32_t *word);
 
-/* Wait until the word is `number`, or a twentieth of a second; tell whether it is. */
+/* Wait until the word is `number`, for a twentieth of a second at most; return whether it is. */
 bool channel_wait(_Atomic uint32_t *word, uint32_t number, struct waiting *self);
 
 #endif

@@ -1,6 +1,6 @@
-/* The host of an isolated FMU: makes the calls that come through shared memory. */
+/* The host of an isolated FMU, which makes the calls that come through shared memory. */
 
-#include "channel.h"
+#include "host.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -24,7 +24,7 @@ static void write_line(int status, const char *category, const char *text)
     while (atomic_flag_test_and_set(&logging))
         ;
     const uint32_t n = atomic_load(&channel->logged);
-    while (n - atomic_load(&channel->read) >= LOG_LINES) /* until the caller has read some */
+    while (n - atomic_load(&channel->read) >= LOG_LINES) /* until the caller has read a line */
         channel_wake(&channel->answer);
     struct log_line *line = &channel->lines[n % LOG_LINES];
     line->status = status;
@@ -54,7 +54,7 @@ static void log3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3Str
 
 /* -------------------------------------------------------------------- arguments */
 
-/* Turn places in data into pointers, of arguments and of the strings and binaries behind them. */
+/* Turn places in data into pointers: of arguments, and of the strings and binary data behind them. */
 static void resolve(const struct call *call, uint64_t a[])
 {
     for (int i = 0; i < call->n; i++) {
@@ -66,14 +66,15 @@ static void resolve(const struct call *call, uint64_t a[])
     }
 }
 
-/* Copy strings or binaries that an argument points to behind all arguments; tell whether there was room. */
+/* Copy the strings or binary data that an argument points to into data, behind all arguments; return
+   whether there was room. */
 static bool bring_out(const struct slot *s, uint64_t *places, const size_t *sizes)
 {
     for (uint32_t j = 0; places != NULL && j < s->n; j++) {
         const char *from = (const char *)(uintptr_t)places[j];
         if (from == NULL)
             continue;
-        const size_t size = sizes != NULL ? sizes[j] : strlen(from) + 1;
+        const size_t size = s->kind == TEXTS_OUT ? strlen(from) + 1 : sizes != NULL ? sizes[j] : 0;
         if (aligned(size) > capacity - channel->used)
             return false;
         memcpy(channel->data + channel->used, from, size);
@@ -83,9 +84,6 @@ static bool bring_out(const struct slot *s, uint64_t *places, const size_t *size
     return true;
 }
 
-static double real(uint64_t word) { return (union { uint64_t w; double d; }){word}.d; }
-static void *pointer(uint64_t word) { return (void *)(uintptr_t)word; }
-
 /* ------------------------------------------------------------------------ calls */
 
 static int instantiated(void *made)
@@ -94,12 +92,8 @@ static int instantiated(void *made)
     return made != NULL ? 0 : STATUS_ERROR;
 }
 
-/* Functions whose arguments are integers and pointers are called as if all of them were 64 bit words:
-   the platforms' conventions pass them alike, and the called function ignores what it does not take.
-   Those with floating-point arguments, and those that make an instance, are called by their type. */
-typedef int words(void *instance, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t);
-
-static int perform(enum function function, void *f, const uint64_t a[])
+/* Make or free the instance, or call another function of the FMU. */
+static int call_fmu(enum function function, void *f, const uint64_t a[])
 {
     static const fmi2CallbackFunctions callbacks = {log2, calloc, free, NULL, NULL};
     switch (function) {
@@ -117,25 +111,10 @@ static int perform(enum function function, void *f, const uint64_t a[])
     case F_fmi3FreeInstance:
         ((fmi2FreeInstanceTYPE *)f)(instance);
         return 0;
-    case F_fmi2SetupExperiment:
-        return ((fmi2SetupExperimentTYPE *)f)(instance, (int)a[0], real(a[1]), real(a[2]), (int)a[3], real(a[4]));
-    case F_fmi3EnterInitializationMode:
-        return ((fmi3EnterInitializationModeTYPE *)f)(instance, (bool)a[0], real(a[1]), real(a[2]), (bool)a[3],
-                                                      real(a[4]));
-    case F_fmi2SetTime:
-    case F_fmi3SetTime:
-        return ((fmi2SetTimeTYPE *)f)(instance, real(a[0]));
-    case F_fmi2DoStep:
-        return ((fmi2DoStepTYPE *)f)(instance, real(a[0]), real(a[1]), (int)a[2]);
-    case F_fmi3DoStep:
-        return ((fmi3DoStepTYPE *)f)(instance, real(a[0]), real(a[1]), (bool)a[2], pointer(a[3]), pointer(a[4]),
-                                     pointer(a[5]), pointer(a[6]));
     default:
-        return ((words *)f)(instance, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7]);
+        return perform(function, f, instance, a);
     }
 }
-
-const char *function_name(int function);
 
 static int make(const struct call *call, void *f)
 {
@@ -147,20 +126,20 @@ static int make(const struct call *call, void *f)
         return STATUS_ERROR;
     }
     resolve(call, a);
-    const int status = perform(call->function, f, a);
-    for (int i = 0; status <= STATUS_WARNING && i < call->n; i++) {
+    const int status = call_fmu(call->function, f, a);
+    for (int i = 0; succeeded(status) && i < call->n; i++) {
         const struct slot *s = &call->arguments[i];
         if (s->kind != TEXTS_OUT && s->kind != BLOBS_OUT)
             continue;
         if (!bring_out(s, pointer(a[i]), s->kind == BLOBS_OUT ? pointer(a[i - 1]) : NULL)) {
-            write_line(STATUS_ERROR, "isolated", "strings or binaries take more room than an isolated FMU has");
+            write_line(STATUS_ERROR, "isolated", "strings or binary data take more room than an isolated FMU has");
             return STATUS_ERROR;
         }
     }
     return status;
 }
 
-/* Say that the FMU is loaded; or that it is not, with the reason. */
+/* Report that the FMU is loaded, or the reason why it is not. */
 EXPORT void host_ready(void *memory, size_t bytes, const char *failure)
 {
     channel = memory;
@@ -171,7 +150,8 @@ EXPORT void host_ready(void *memory, size_t bytes, const char *failure)
     channel_post(&channel->answer, 1, &channel->caller);
 }
 
-/* Make calls until the caller asks for none, which is the end; `functions` are the FMU's, in the order of functions.h. */
+/* Make calls until a request has none, which is the end. `functions` are the FMU's, in the order of
+   functions.h; NULL where the FMU has none. */
 EXPORT void host_serve(void *const functions[])
 {
     for (uint32_t number = 2;; number++) {
@@ -180,7 +160,7 @@ EXPORT void host_serve(void *const functions[])
         if (channel->n == 0)
             return;
         int status = 0;
-        for (int i = 0; i < channel->n && status <= STATUS_WARNING; i++) {
+        for (int i = 0; i < channel->n && succeeded(status); i++) {
             struct call *call = &channel->calls[i];
             atomic_store_explicit(&channel->done, i + 1, memory_order_relaxed);
             status = call->status = make(call, functions[call->function]);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import subprocess
 import sys
@@ -14,11 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import cosim
 from cosim import FMU, Block, FMUError, Output, Simulation, SimulationError, SnapshotError, System, simulate
-from cosim.codegen.c_compiler import LIBRARY_FLAGS, PLATFORMS, fmi_headers, host, zig_cc
 from cosim.fmi.instance.fmi2 import Fmi2
 from cosim.fmi.instance.fmi3 import Fmi3
+from cosim.fmi.isolation.isolation import compile_support
 from cosim.loop.signals import Failures
 from fmus.export import export
 from tests.cosim.fmi.ball import ball
@@ -243,6 +243,53 @@ def test_a_failed_set_stops_the_step_that_it_is_sent_with(tmp_path):
     assert caught.value.result["plant.x"].tolist() == [k * H for k in range(9)]
 
 
+def test_a_failed_set_among_more_than_fit_in_a_request_is_reported(tmp_path):
+    """The 3rd of 40 sets of the loop fails; requests have 16 calls, and none of these has an answer."""
+    with instance(Fmi2, crash(tmp_path, "none choosy 0")) as fmi:
+        set_real, get_real = fmi.api.dll.loop_fmi2SetReal, fmi.api.dll.loop_fmi2GetReal
+        component, x = fmi.api.component, (ctypes.c_uint32 * 1)(1)
+        kinds = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+        set_real.argtypes = get_real.argtypes = kinds
+        statuses = [set_real(component, x, 1, (ctypes.c_double * 1)(i)) for i in range(1, 41)]
+        assert statuses.count(3) == 1, statuses
+        value = (ctypes.c_double * 1)()
+        assert (get_real(component, x, 1, value), value[0]) == (0, 40.0)
+
+
+ODD_CALLS = """
+    import ctypes, sys
+    from cosim import FMU
+    from cosim.fmi.isolation.isolation import _LOOK, _support
+    from cosim.loop.signals import Failures
+
+    fmu = FMU(sys.argv[1], isolated=True)
+    fmi = fmu.adapter(fmu, "p", False, Failures())
+    dll, c, vr = fmi.api.dll, fmi.api.component, (ctypes.c_uint32 * 1)(0)
+    kinds = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+    dll.loop_fmi2SetReal.argtypes = dll.loop_fmi2GetReal.argtypes = dll.fmi2SetString.argtypes = kinds
+    dll.fmi2FreeInstance.argtypes = (ctypes.c_void_p,)
+    dll.fmi2SetDebugLogging.argtypes = (ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t, ctypes.c_void_p)
+    print(dll.loop_fmi2SetReal(None, vr, 1, vr), dll.loop_fmi2GetReal(None, vr, 1, vr))
+    print(dll.fmi2FreeInstance(None), dll.fmi2SetDebugLogging(c, 1, 2, None))
+    print(dll.fmi2SetString(c, vr, 1, None), dll.fmi2SetString(c, vr, 1, None))
+    fmi.close()
+
+    damaged = ctypes.create_string_buffer(1 << 20)
+    caller = _support().caller_open(ctypes.addressof(damaged), 1 << 20, _LOOK(lambda *_: 0))
+    for byte in (0x7F, 0xFF):
+        ctypes.memset(damaged, byte, 1 << 20)
+        print(_support().caller_function(caller), _support().caller_time(caller))
+"""
+
+
+def test_null_pointers_and_damaged_memory_do_not_crash_this_process(tmp_path):
+    """In a process of its own, which would crash. The second string finds the host crashed by the first."""
+    fmu = crash(tmp_path)
+    command = [sys.executable, "-c", textwrap.dedent(ODD_CALLS), str(fmu.path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.stdout.split("\n") == ["3 3", "None 0", "4 4", "-1 nan", "-1 nan", ""], done.stderr
+
+
 # --------------------------------------------------------------------------------- crashes
 
 ENDS = {
@@ -391,9 +438,7 @@ def test_the_fmu_ends_with_the_process_that_runs_it(tmp_path):
 
 
 def test_the_c_code_compiles_without_a_warning(tmp_path):
-    options = ["-target", PLATFORMS[host()].target, *LIBRARY_FLAGS, "-Wshadow", "-Werror"]
-    sources = sorted((Path(cosim.__file__).parent / "fmi" / "isolation" / "c").glob("*.c"))
-    done = zig_cc([*options, f"-I{fmi_headers()}", *sources, "-o", tmp_path / "isolation"], tmp_path)
+    done, _ = compile_support(tmp_path, "-Wshadow", "-Werror")
     assert (done.returncode, done.stderr) == (0, "")
 
 
