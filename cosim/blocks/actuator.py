@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block, Continuous
-from ..core.variables import Array, Input, Output, Parameter, State
+from ..core.variables import Input, Output, Parameter, State
 from ..functions import clip
 
 
@@ -44,9 +43,6 @@ class FirstOrderActuator(Continuous):
     limit = Parameter(1.0, "largest force", unit="N", shape="n", min=0.0)
     u = Input("command", unit="N", shape="n")
     F = State(0.0, "force", unit="N", shape="n")
-
-    if TYPE_CHECKING:
-        der_F: Array
 
     def __init__(self, tau: float, limit: ArrayLike = math.inf, *, n: int | None = None) -> None:
         super().__init__(tau=tau, limit=limit, n=n)

@@ -12,12 +12,12 @@ In the ports u is the signal and y the filtered one, u_f.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Unpack
+from typing import Unpack
 
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block, Continuous
-from ..core.variables import Array, Input, Local, Output, Parameter, State
+from ..core.variables import Input, Local, Output, Parameter, State
 from .options import SampledSignal, Signal
 
 
@@ -31,9 +31,6 @@ class LowPass(Continuous):
     y = State(0.0, "filtered signal", unit="$unit", shape="n")
     held = Local(0.0, "step for which approach is valid", unit="s")
     approach = Local(0.0, "1 - e^(-h / tau)")
-
-    if TYPE_CHECKING:
-        der_y: Array
 
     def __init__(self, tau: float = 0.1, *, y: ArrayLike = 0.0, **options: Unpack[Signal]) -> None:
         super().__init__(tau=tau, y=y, **options)

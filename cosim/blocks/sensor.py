@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,10 +35,6 @@ class SensorDynamics(Continuous):
     held = Local(0.0, "step for which decay is valid", unit="s")
     decay = Local(0.0, "e^(-h / mu)")
 
-    if TYPE_CHECKING:
-        der_y: Array
-        der_z: Array
-
     def __init__(self, mu: float = 0.008, **options: Unpack[Signal]) -> None:
         super().__init__(mu=mu, **options)
 
@@ -68,9 +64,6 @@ class StrictlyProper(LinearContinuous):
     x = State(0.0, "state", shape="n")
     y = Output("measured signal", unit="$unit", shape="p")
 
-    if TYPE_CHECKING:
-        der_x: Array
-
     def __init__(self, A: ArrayLike, B: ArrayLike, C: ArrayLike, *, unit: str | None = None) -> None:
         super().__init__(A=A, B=B, C=C, unit=unit)
 
@@ -93,9 +86,6 @@ class StateSpace(LinearContinuous):
     u = Input("true signal", unit="$unit", shape="m")
     x = State(0.0, "state", shape="n")
     y = Output("measured signal", unit="$unit", shape="p")
-
-    if TYPE_CHECKING:
-        der_x: Array
 
     def __init__(
         self, A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, *, unit: str | None = None

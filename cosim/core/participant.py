@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Mapping
 from numbers import Real
 from types import NoneType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -365,6 +365,12 @@ class Continuous(Participant):
     KERNELS = ("initialize", "derivatives", "outputs", "advance")
 
     derivative_vector: Array
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Stand for `der_x` of every state `x`, whose name a type checker cannot derive."""
+
     max_step = Parameter(np.inf, "largest internal step of advance", unit="s", min=1e-12, fixed=True)
     integrator_work = Local(0.0, "stages of advance", shape=(3, "n_states"))
 
