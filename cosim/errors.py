@@ -1,7 +1,7 @@
-"""Errors that say where, what, and what to do about it.
+"""Errors that say where, what, and what to do about it; and warnings.
 
-Every error that a user can cause derives from `CosimError`. The command line
-prints its text and ends with exit code 2; a traceback means a defect of ours.
+Every error that a user can cause derives from `CosimError`. The command line prints its
+text and ends with exit code 2; a traceback means a defect of structcosim itself.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class DeclarationError(CosimError):
 
 
 class WiringError(CosimError):
-    """Ports that cannot be connected: unknown name, other shape, other unit, or a cycle."""
+    """Ports that cannot be connected: unknown name, different shape, incompatible unit, or a cycle."""
 
 
 class CompilationError(CosimError):
@@ -31,7 +31,7 @@ class FMUError(CosimError):
 
 
 class RecordError(CosimError):
-    """A record file that cannot be read."""
+    """A ground motion, table or result file that cannot be read or written."""
 
 
 class TimeError(CosimError):
@@ -44,6 +44,14 @@ class SnapshotError(CosimError):
 
 class SimulationEndedWarning(UserWarning):
     """A participant asked to end the run before its stop time: a normal end; see `Result.ended`."""
+
+
+class CompiledKernelsWarning(UserWarning):
+    """A block runs as a Python callback because Numba cannot compile it."""
+
+
+class LateEventWarning(UserWarning):
+    """An event was handled at the end of the step in which it occurs."""
 
 
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:

@@ -1,4 +1,8 @@
-"""Which outputs depend on which inputs: read off the source code of the kernels.
+"""Which outputs depend on which inputs (feedthrough): read off the source code of the kernels.
+
+A run orders its evaluation by this answer (stage coupling, algebraic cycles): it holds for every
+value of the parameters, and needs no compilation. The model structure of an exported FMU refines
+it by element, for the parameters as they are: fmus/export/dependencies.py.
 
 The answer is a superset, by variable: assignments are followed without regard to their
 order, a condition counts for everything assigned under it (for everything, where it

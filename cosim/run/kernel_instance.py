@@ -19,14 +19,10 @@ from ..codegen.kernels import kernel_addresses
 from ..core.dependencies import dependencies
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from ..core.variables import Array
-from ..errors import CompilationError, DeclarationError
+from ..errors import CompilationError, CompiledKernelsWarning, DeclarationError
 from ..loop.operations import CALL, COPY, Op
 from ..loop.signals import KERNEL, Failures
 from ..result import SimulationError
-
-
-class CompiledKernelsWarning(UserWarning):
-    """A block runs as a Python callback because Numba cannot compile it."""
 
 
 class KernelInstance:

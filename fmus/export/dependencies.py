@@ -1,7 +1,8 @@
 """Which element of which unknown depends on which known: ModelStructure of an FMU.
 
-`cosim.core.dependencies` reads the kernels and answers by variable: a superset. By
-element it is refined here by running the model, where that is exact: the IR of the
+`cosim.core.dependencies` reads the kernels and answers by variable: a superset, which is
+enough to order a run. An exported FMU tells its host which element depends on which, so
+that answer is refined here by running the model, where that is exact: the IR of the
 kernels compares no floating-point numbers, so the same instructions run whatever the
 values, and outputs are analytic functions of them (sums, products, quotients, functions
 of libm). An analytic function that does not depend on an element never changes with it;

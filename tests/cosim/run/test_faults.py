@@ -26,7 +26,7 @@ from cosim import (
     WiringError,
     simulate,
 )
-from cosim.run.kernel_instance import CompiledKernelsWarning
+from cosim.errors import CompiledKernelsWarning
 from tests.cosim.parts import Counter, Gain, Mass, Ramp
 
 
@@ -378,7 +378,7 @@ class Sized(Block):
     ("values", "words"),
     [
         ({}, "size m, n is not known"),
-        ({"m": 2.5, "n": 1}, "size m=2.5 is no whole number"),
+        ({"m": 2.5, "n": 1}, "size m=2.5 must be a whole number"),
         ({"m": "a", "n": 1}, "size m='a'"),
         ({"K": [1.0, 2.0]}, "has 2 dimensions"),
         ({"K": np.ones((2, 3)), "m": 3}, "m is 3, not 2"),
