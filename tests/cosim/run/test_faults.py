@@ -27,7 +27,7 @@ from cosim import (
     simulate,
 )
 from cosim.errors import CompiledKernelsWarning
-from tests.cosim.parts import Counter, Gain, Mass, Ramp
+from tests.cosim.parts import Counter, Diverges, Gain, Mass, Ramp
 
 
 class TurnsNaN(Block):
@@ -38,15 +38,6 @@ class TurnsNaN(Block):
     def step(self, t, h):
         self.y[0] = t
         self.y[1] = (1.0 - t) ** 0.5
-
-
-class Diverges(Continuous):
-    """x' = x^2: infinite at t = 1 / x0 = 0.5, whatever the solver makes of it; no outputs."""
-
-    x = State(2.0)
-
-    def derivatives(self, t):
-        self.der_x = self.x * self.x
 
 
 @pytest.mark.parametrize("jit", [True, False])

@@ -22,30 +22,15 @@ from cosim.fmi.isolation.isolation import compile_support
 from cosim.loop.signals import Failures
 from fmus.export import export
 from tests.cosim.fmi.ball import ball
+from tests.cosim.fmi.crash import crash
 from tests.cosim.fmi.metronome import metronome
-from tests.cosim.fmi.probe import probe, write_fmu
-from tests.cosim.fmi.test_fmu import Chain, closed
+from tests.cosim.fmi.probe import probe
+from tests.cosim.parts import Chain, closed
+from tests.processes import children
 
 H = 0.0625  # a binary fraction: times are exact
 VERSIONS = ["2.0", "3.0"]
 INTERFACES = ["CoSimulation", "ModelExchange"]
-
-
-def crash(folder: Path, fault: str = "none", interface: str = "CoSimulation") -> FMU:
-    """The FMU of c/crash.c."""
-    folder.mkdir(exist_ok=True)
-    text = f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="crash" guid="{fault}">
-<{interface} modelIdentifier="crash" canGetAndSetFMUstate="true" canSerializeFMUstate="true"/><ModelVariables>
-<ScalarVariable name="u" valueReference="0" causality="input"><Real start="1"/></ScalarVariable>
-<ScalarVariable name="x" valueReference="1" causality="output" initial="exact"><Real start="0"/>
-</ScalarVariable>
-<ScalarVariable name="der(x)" valueReference="2"><Real derivative="2"/></ScalarVariable>
-<ScalarVariable name="y" valueReference="3" causality="output"><Real/></ScalarVariable>
-</ModelVariables><ModelStructure><Outputs><Unknown index="2"/><Unknown index="4"/></Outputs>
-<Derivatives><Unknown index="3"/></Derivatives><InitialUnknowns><Unknown index="4"/></InitialUnknowns>
-</ModelStructure></fmiModelDescription>"""
-    return FMU(write_fmu(folder / "crash.fmu", text, "crash", "crash.c"), isolated=True)
 
 
 class One(Block):
@@ -59,19 +44,6 @@ class One(Block):
 
 def driven(plant: FMU) -> System:
     return System({"plant": plant, "one": One()}, [("one.u", "plant.u")])
-
-
-def children(parent: int) -> set[int]:
-    """The processes that a process has started and not waited for, zombies too."""
-    found = set()
-    for entry in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = entry.read_text().rpartition(")")[2].split()
-        except OSError:  # it has ended meanwhile
-            continue
-        if int(fields[1]) == parent:
-            found.add(int(entry.parent.name))
-    return found
 
 
 @pytest.fixture(autouse=True)
