@@ -50,7 +50,7 @@ def build() -> Any:
     from cosim.blocks import function_source
     from fmus.plants.shear_building import ShearBuilding
 
-    plant = ShearBuilding.with_modal_damping([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
+    plant = ShearBuilding.build([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
     members = {"building": plant, "ground": function_source(ground), "damper": ViscousDampers(c=DAMPING, p=1)}
     links = [("building.v[3]", "damper.v"), ("damper.u", "building.force[3]")]
     return System(members, [("ground.y", "building.ground_acceleration"), *links])

@@ -39,7 +39,7 @@ class RoofDamper(Block):
 
 def build(*, late: bool = False) -> System:
     """Return the system, or the one that a master without an order of blocks makes of it."""
-    building = ShearBuilding.with_modal_damping([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
+    building = ShearBuilding.build([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
     ground = function_source(lambda t: 2.0 * math.sin(9.0 * t) * math.exp(-0.5 * t), unit="m/s^2")
     system = System({"building": building, "ground": ground, "control": RoofDamper()})
     system.connect("building.v[3]", "control.v")

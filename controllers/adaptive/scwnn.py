@@ -108,8 +108,8 @@ class SCWNN(Block):
         self.i += 1.0
 
     @classmethod
-    def of_size(cls, p: int, n_nodes: int = 40, **values: Any) -> SCWNN:
-        """For p displacements; at most n_nodes nodes."""
+    def design(cls, p: int, n_nodes: int = 40, **values: Any) -> SCWNN:
+        """Make the controller of p displacements with at most n_nodes nodes."""
         return cls(p=p, n=2 * p, n_nodes=n_nodes, **values)
 
 

@@ -25,7 +25,7 @@ from cosim import Array
 from .riccati import DesignError, regulator
 
 
-def sliding_surface(A: Array, B: Array, Q: Array) -> Array:
+def optimal_surface(A: Array, B: Array, Q: Array) -> Array:
     """P (m, n) of s = P x for x' = A x + B u and the weight Q (n, n)."""
     n, m = B.shape
     # the m states that the actuators move most directly are x_2
@@ -37,7 +37,7 @@ def sliding_surface(A: Array, B: Array, Q: Array) -> Array:
     if values[-1] <= 1e-10 * values[0] or values[0] == 0.0:
         weakest = int(np.argmin(np.linalg.norm(B, axis=0)))
         raise DesignError(
-            f"sliding_surface: the forces act through fewer than {m} independent ways "
+            f"optimal_surface: the forces act through fewer than {m} independent ways "
             f"(det B_2 = 0, look at actuator {weakest + 1}); remove a redundant actuator"
         )
     D = np.eye(n)[np.concatenate([first, second])]
@@ -51,7 +51,7 @@ def sliding_surface(A: Array, B: Array, Q: Array) -> Array:
         Qt[a, a],
         0.5 * (Qt[b, b] + Qt[b, b].T),
         Qt[a, b],
-        what="sliding_surface",
+        what="optimal_surface",
         names="actuator state",
         remedy="the surface cannot stabilise it; move the actuator",
     )

@@ -17,8 +17,8 @@ import scipy.linalg as la
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import matvec, matvec_add
 
-from ..design.condensation import StateSpace
-from ..design.surface_design import require_regular, sliding_surface
+from ..design.state_space import StateSpace
+from ..design.surface_design import optimal_surface, require_regular
 
 
 class ContinuousSlidingMode(Block):
@@ -41,7 +41,7 @@ class ContinuousSlidingMode(Block):
         cls, model: StateSpace, Q: Array, rate: float, every: int | None = None
     ) -> ContinuousSlidingMode:
         """rate: least rate of approach to the surface, 1/s; delta = rate / smallest (P B)(P B)'."""
-        P = sliding_surface(model.A, model.B, Q)
+        P = optimal_surface(model.A, model.B, Q)
         PB = P @ model.B
         require_regular(PB, "ContinuousSlidingMode")
         delta = rate / np.linalg.svd(PB, compute_uv=False)[-1] ** 2

@@ -14,9 +14,9 @@ import numpy as np
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import dot
 
-from ..design.condensation import StateSpace
 from ..design.riccati import DesignError
-from ..design.surface_design import require_regular, sliding_surface
+from ..design.state_space import StateSpace
+from ..design.surface_design import optimal_surface, require_regular
 
 
 class StateSurface(Block):
@@ -50,7 +50,7 @@ def design(model: StateSpace, Q: Array) -> tuple[StateSurface, EquivalentForce]:
             f"equivalent_force: {model.B.shape[1]} actuators, "
             "the gain laws of chapter 4 take one; use SlidingMode"
         )
-    P = sliding_surface(model.A, model.B, Q)
+    P = optimal_surface(model.A, model.B, Q)
     PB = P @ model.B
     require_regular(PB, "equivalent_force")
     row = np.ascontiguousarray

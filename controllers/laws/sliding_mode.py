@@ -15,8 +15,8 @@ import scipy.linalg as la
 from cosim import Array, Block, Input, Local, Output, Parameter
 from cosim.functions import matvec, norm, sign
 
-from ..design.condensation import StateSpace
-from ..design.surface_design import require_regular, sliding_surface
+from ..design.state_space import StateSpace
+from ..design.surface_design import optimal_surface, require_regular
 
 
 class SlidingMode(Block):
@@ -45,7 +45,7 @@ class SlidingMode(Block):
         cls, model: StateSpace, Q: Array, a: float = 1.065, delta: float = 0.001, every: int | None = None
     ) -> SlidingMode:
         """Make the controller with the surface that minimises int x' Q x dt, (2.10) to (2.13)."""
-        P = sliding_surface(model.A, model.B, Q)
+        P = optimal_surface(model.A, model.B, Q)
         PB = P @ model.B
         require_regular(PB, "SlidingMode")
         return cls(P=P, PA=P @ model.A, PB_inv=la.inv(PB), a=a, delta=delta, every=every)

@@ -12,8 +12,8 @@ from __future__ import annotations
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import matvec
 
-from ..design.condensation import StateSpace
 from ..design.riccati import regulator
+from ..design.state_space import StateSpace
 
 
 class StateFeedback(Block):
@@ -27,11 +27,11 @@ class StateFeedback(Block):
         matvec(self.minus_K, self.x_hat, self.u)
 
     @classmethod
-    def lqg(
+    def lqr(
         cls, model: StateSpace, Q: Array, R: Array, N: Array | None = None, every: int | None = None
     ) -> StateFeedback:
         """Make the linear-quadratic regulator of a model."""
-        _, K = regulator(model.A, model.B, Q, R, N, what="LQG regulator")
+        _, K = regulator(model.A, model.B, Q, R, N, what="LQR")
         return cls(minus_K=-K, every=every)
 
 

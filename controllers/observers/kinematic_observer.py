@@ -40,7 +40,7 @@ class KinematicObserver(Block):
         matvec(self.T, self.speed, self.v)
 
     @classmethod
-    def of_rigid_parts(cls, places: Array, sensors: Array, alpha: float = 0.5) -> KinematicObserver:
+    def design(cls, places: Array, sensors: Array, alpha: float = 0.5) -> KinematicObserver:
         """From rows over the structure's degrees of freedom: places (p, n) and sensors (r, n).
 
         The places must move as a combination of the sensors does; otherwise a ValueError.

@@ -26,8 +26,8 @@ import scipy.linalg as la
 from cosim import Array, Block, Input, Local, Parameter, State
 from cosim.functions import assign, matvec, matvec_add
 
-from ..design.condensation import StateSpace
 from ..design.riccati import regulator
+from ..design.state_space import StateSpace
 
 
 def observer_gain(model: StateSpace, S_ww: Array, S_vv: Array) -> Array:
@@ -61,19 +61,17 @@ class Observer(Block):
 
     @classmethod
     def design(cls, model: StateSpace, S_ww: Array, S_vv: Array, period: float) -> Observer:
-        """Make the observer of a model for a sample period in s."""
-        return cls.from_gain(model, observer_gain(model, S_ww, S_vv), period)
+        """Make the observer of a model with the gain (2.6), for a sample period in s."""
+        A_d, B_d, L_d = discretise(model, observer_gain(model, S_ww, S_vv), period)
+        return cls(A_d=A_d, B_d=B_d, L_d=L_d, sample_period=period)
 
-    @classmethod
-    def from_gain(cls, model: StateSpace, L: Array, period: float) -> Observer:
-        """Make the observer with a gain L (n, r), exactly discretised for held u and y."""
-        n, m = model.B.shape
-        inputs = np.hstack([model.B - L @ model.D, L])
-        k = inputs.shape[1]
-        exponent = np.zeros((n + k, n + k))
-        exponent[:n] = period * np.hstack([model.A - L @ model.C, inputs])
-        transition = la.expm(exponent)
-        return cls(
-            A_d=transition[:n, :n], B_d=transition[:n, n : n + m], L_d=transition[:n, n + m :],
-            sample_period=period,
-        )  # fmt: skip
+
+def discretise(model: StateSpace, L: Array, period: float) -> tuple[Array, Array, Array]:
+    """Return A_d, B_d, L_d of the observer with the gain L (n, r), exact for held u and y."""
+    n, m = model.B.shape
+    inputs = np.hstack([model.B - L @ model.D, L])
+    k = inputs.shape[1]
+    exponent = np.zeros((n + k, n + k))
+    exponent[:n] = period * np.hstack([model.A - L @ model.C, inputs])
+    transition = la.expm(exponent)
+    return transition[:n, :n], transition[:n, n : n + m], transition[:n, n + m :]

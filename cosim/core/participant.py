@@ -66,6 +66,8 @@ class Participant:
     KERNELS: ClassVar[tuple[str, ...]] = ()
     #: False: the kernels contain Python that Numba cannot compile; they are called back
     compiled: ClassVar[bool] = True
+    #: locals that name the step for which matrices are kept; 0 in them makes `advance` compute anew
+    CACHE_KEYS: ClassVar[tuple[str, ...]] = ()
     #: sizes by name that are neither given nor those of a given array
     DEFAULT_SIZES: ClassVar[Mapping[str, int]] = {}
     #: see component.py, whose contract every participant keeps
@@ -429,6 +431,8 @@ class LinearContinuous(Continuous):
 
     A, B and c are read off `derivatives` (unit states, unit inputs) whenever h changes.
     """
+
+    CACHE_KEYS = ("hold_step",)
 
     hold_step = Local(0.0, "step for which the hold matrices are valid", unit="s")
     hold_A = Local(0.0, "e^(A h), transposed", shape=("n_states", "n_states"))

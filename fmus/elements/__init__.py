@@ -1,1 +1,1 @@
-"""Force-deformation laws of elements."""
+"""Nonlinear elements of structures: one file for each force law."""

@@ -79,8 +79,8 @@ def build_model(participant: Participant, identifier: str, fmi_version: str, ker
     """Return the model of a participant whose kernels have been lowered to `kernels`."""
     check_symbols(kernels, identifier)
     start = participant.memory.astype("<f8")
-    if (kept := participant.variables.get("hold_step")) is not None and kept.kind == "local":
-        start[kept.slot] = 0.0  # matrices of an earlier advance may not survive other parameters
+    for name in participant.CACHE_KEYS:
+        start[participant.variables[name].slot] = 0.0  # matrices of an earlier advance
     return Model(identifier, fmi_version, kernels, _table(participant, identifier), start.tobytes())
 
 

@@ -1,25 +1,32 @@
 """One step of a linear structure with nonlinear elements, by Newmark 1/4, 1/2.
 
-    M x'' + C x' + K x + B (f(d) - k0 d) = p,   d = B^T x
+    M x'' + C x' + K x + B (f(d) - k0 d) = p,   d = B' x                                 (1)
 
 K is the initial tangent of everything; f are the forces of the nonlinear elements, k0
-their initial tangents, r = f - k0 d what the elements do beyond linear. The load p is held
-over the step, so constant average acceleration reads, with dx = x1 - x0,
+their initial tangents, and r = f - k0 d is the part of the forces beyond linear. The load
+p is held over the step, so constant average acceleration reads, with dx = x1 - x0,
 
-    (4/h^2 M + 2/h C + K) dx = 2 p + 4/h M v0 - 2 K x0 - B (r0 + r1),  v1 = 2/h dx - v0
+    (4/h^2 M + 2/h C + K) dx = 2 p + 4/h M v0 - 2 K x0 - B (r0 + r1),  v1 = 2/h dx - v0  (2)
 
-Let F = B^T (4/h^2 M + 2/h C + K)^-1 B be the flexibility of the elements' deformations,
-and d^ the deformations with r1 = 0. What remains nonlinear is as small as the elements are:
+Let F = B' (4/h^2 M + 2/h C + K)^-1 B be the flexibility of the elements' deformations,
+and d^ the deformations with r1 = 0. The nonlinear problem that remains has the size of
+the elements:
 
-    g(d1) = d1 - d^ + F r(d1) = 0                    Newton, on the elements off their
-                                                     initial tangent only
-The factors and F are found once for h and for h/2, h/4, ... If an element's tangent
-changes within a step, the mean force the method sees over the step differs from the
-force along the path. Where this difference of work is more than `event_tolerance` of the
-energy in the structure, the step is taken again as two halves, and so on: events are bracketed
-by bisection. A step that does not converge is halved likewise.
+    g(d1) = d1 - d^ + F r(d1) = 0                                                        (3)
 
-The functions work on the record of a `NonlinearStructure` (fields there), named s.
+It is solved by Newton's method on the elements that have left their initial tangent. The
+factors and F are found once for h and for h/2, h/4, ...
+
+If an element's tangent changes within a step, the mean force that the method sees over
+the step differs from the force along the path. Where this difference of work is more than
+`event_tolerance` of the energy in the structure, the step is taken again as two halves,
+and so on: bisection brackets the event. A step that does not converge is halved likewise.
+
+The functions work on the record of a `NonlinearStructure`, named s; its fields are
+declared there. `advance_with` compiles the force laws of the given elements into a step.
+
+Source: N. M. Newmark, A method of computation for structural dynamics, Journal of the
+Engineering Mechanics Division 85 (1959) 67-94, DOI 10.1061/JMCEA3.0000098.
 """
 
 from __future__ import annotations
@@ -30,46 +37,89 @@ from math import nan
 from typing import Any
 
 from cosim import Array
+from cosim.functions import solve as solve_dense
 
-from ..elements.hysteresis import (
-    BILINEAR,
-    BOUC_WEN,
-    FRICTION,
-    GAP,
-    LINEAR,
-    OWN,
-    SEGMENT,
-    VISCOUS,
-    bilinear,
-    bouc_wen,
-    friction,
-    gap,
-    linear,
-    segment,
-    viscous,
-)
+from ..elements.element import PLASTIC, YIELDING, Law
 from .sparse_ldl import factor, solve, symmetric_product
 
+Advance = Callable[[Any, float, float], None]
 
-def own_law(
-    e: int, d: float, d0: float, rate: float, h: float, p: Array, z0: Array, z: Array
-) -> tuple[float, float, float, float]:
-    """Stand for the law of elements of kind OWN; `with_law` puts another in this place."""
-    return linear(e, d, d0, rate, h, p, z0, z)
+LAST_DAMPING = 1.0 / 32.0  # Newton: the smallest share of a correction that is tried
 
 
-def with_law(law: Callable[..., tuple[float, float, float, float]]) -> Callable[[Any, float, float], None]:
-    """Return an `advance` like the one below whose elements of kind OWN follow `law`."""
-    namespace: dict[str, Any] = {**globals(), "own_law": law}
-    for name, function in globals().items():
-        if isinstance(function, types.FunctionType) and function.__module__ == __name__ and name != "own_law":
-            namespace[name] = types.FunctionType(function.__code__, namespace, name)
-    made: Callable[[Any, float, float], None] = namespace["advance"]
+# --------------------------------------------------------------------- force laws
+
+
+def no_law(s: Any, e: int, h: float) -> tuple[float, float]:
+    """End the chain of laws: row e has none of its own (the second row of a pair)."""
+    return 0.0, 0.0
+
+
+#: what `rebound` replaces in `row_law` and `pair_law`
+number: int = -1
+law: Any = None
+otherwise: Any = no_law
+
+
+def row_law(s: Any, e: int, h: float) -> tuple[float, float]:
+    """Evaluate row e by `law` if its law has this `number`; leave it to `otherwise` if not."""
+    if int(s.law[e]) != number:
+        passed_on: tuple[float, float] = otherwise(s, e, h)
+        return passed_on
+    d, d0 = s.d1[e], s.d[e]
+    rate = 2.0 / h * (d - d0) - s.rate[e]
+    s.f1[e], s.kt[e], stored, lost = law(e, d, d0, rate, h, s.law_parameters, s.z, s.z1)
+    return stored, lost
+
+
+def pair_law(s: Any, e: int, h: float) -> tuple[float, float]:
+    """Evaluate rows e and e + 1 likewise, by a law of two rows."""
+    if int(s.law[e]) != number:
+        passed_on: tuple[float, float] = otherwise(s, e, h)
+        return passed_on
+    both: tuple[float, float] = law(e, s.d1, s.d, s.law_parameters, s.z, s.z1, s.f1, s.kt, s.kc)
+    return both
+
+
+evaluate: Any = no_law
+
+
+def elements(s: Any, h: float) -> None:
+    """Write forces, tangents and energies of all elements at the deformations d1."""
+    s.stored1 = 0.0
+    s.lost1 = 0.0
+    for e in range(s.k0.shape[0]):
+        stored, lost = evaluate(s, e, h)
+        s.lost_now[e] = lost
+        s.stored1 += stored
+        s.lost1 += lost
+
+
+def advance_with(laws: tuple[tuple[Law, int], ...]) -> Advance:
+    """Return an `advance` that evaluates elements by these laws; each comes with its number of rows.
+
+    Row e follows the law whose position in `laws` is s.law[e]. The compiled step contains
+    these laws and no others.
+    """
+    chain: Any = no_law
+    for position, (function, rows) in reversed(list(enumerate(laws))):
+        link = row_law if rows == 1 else pair_law
+        chain = rebound(link, number=position, law=function, otherwise=chain)
+    step = rebound(trial, elements=rebound(elements, evaluate=chain))
+    made: Advance = rebound(advance, trial=step)
     return made
 
 
+def rebound(function: Callable[..., Any], **names: Any) -> Any:
+    """Return a copy of a function that sees other values under the given global names."""
+    return types.FunctionType(function.__code__, {**function.__globals__, **names}, function.__name__)
+
+
+# ----------------------------------------------------------------------- the step
+
+
 def prepare(s: Any, h: float) -> None:
-    """Factor the effective stiffness and condense the flexibility for h, h/2, h/4, ..."""
+    """Factor the matrix of (2), and find the flexibility F, for h, h/2, h/4, ..."""
     s.h_ready = h
     n = s.M.shape[0]
     rows = s.k0.shape[0]
@@ -95,7 +145,7 @@ def prepare(s: Any, h: float) -> None:
 
 
 def row_times(s: Any, e: int, x: Array) -> float:
-    """Row e (elements first, then actuators, displacements, accelerations) times x."""
+    """Return row e times x; rows are those of elements, actuators, displacements, accelerations."""
     total = 0.0
     for p in range(int(s.row_start[e]), int(s.row_start[e + 1])):
         total += s.row_value[p] * x[int(s.row_dof[p])]
@@ -108,44 +158,14 @@ def add_row(s: Any, e: int, force: float, load: Array) -> None:
         load[int(s.row_dof[p])] += s.row_value[p] * force
 
 
-def elements(s: Any, h: float) -> None:
-    """Forces, tangents and energies of all elements at the deformations d1."""
-    s.stored1 = 0.0
-    s.lost1 = 0.0
-    for e in range(s.k0.shape[0]):
-        kind = int(s.kind[e])
-        d, d0 = s.d1[e], s.d[e]
-        rate = 2.0 / h * (d - d0) - s.rate[e]
-        stored, lost = 0.0, 0.0
-        if kind == BILINEAR:
-            s.f1[e], s.kt[e], stored, lost = bilinear(e, d, d0, rate, h, s.law, s.z, s.z1)
-        elif kind == SEGMENT:
-            stored, lost = segment(e, s.d1, s.d, s.law, s.z, s.z1, s.f1, s.kt, s.kc)
-        elif kind == BOUC_WEN:
-            s.f1[e], s.kt[e], stored, lost = bouc_wen(e, d, d0, rate, h, s.law, s.z, s.z1)
-        elif kind == GAP:
-            s.f1[e], s.kt[e], stored, lost = gap(e, d, d0, rate, h, s.law, s.z, s.z1)
-        elif kind == VISCOUS:
-            s.f1[e], s.kt[e], stored, lost = viscous(e, d, d0, rate, h, s.law, s.z, s.z1)
-        elif kind == FRICTION:
-            s.f1[e], s.kt[e], stored, lost = friction(e, d, d0, rate, h, s.law, s.z, s.z1)
-        elif kind == LINEAR:
-            s.f1[e], s.kt[e], stored, lost = linear(e, d, d0, rate, h, s.law, s.z, s.z1)
-        elif kind == OWN:
-            s.f1[e], s.kt[e], stored, lost = own_law(e, d, d0, rate, h, s.law, s.z, s.z1)
-        s.lost_now[e] = lost
-        s.stored1 += stored
-        s.lost1 += lost
-
-
 def residual(s: Any, level: int) -> float:
-    """g = d1 - d^ + F r; returns its largest entry in units of each element's scale."""
+    """Write g of (3); return its largest entry, relative to the scale of the element."""
     rows = s.k0.shape[0]
     for e in range(rows):
         s.r1[e] = s.f1[e] - s.k0[e] * s.d1[e]
         s.g[e] = s.d1[e] - s.d_hat[e]
     for e in range(rows):
-        if int(s.kind[e]) == SEGMENT:
+        if s.k0_coupling[e] != 0.0:
             s.r1[e] -= s.k0_coupling[e] * s.d1[e + 1]
             s.r1[e + 1] -= s.k0_coupling[e] * s.d1[e]
     for e in range(rows):
@@ -162,14 +182,12 @@ def residual(s: Any, level: int) -> float:
 
 
 def newton_direction(s: Any, level: int) -> None:
-    """Solve (I + F dK) correction = -g on the rows that have left their initial tangent."""
+    """Solve (I + F dK) correction = -g, where dK = kt - k0 is zero on most rows."""
     rows = s.k0.shape[0]
     n = 0
     for e in range(rows):
         s.dk[e] = s.kt[e] - s.k0[e]
-        s.dk_coupling[e] = 0.0
-        if int(s.kind[e]) == SEGMENT:
-            s.dk_coupling[e] = s.kc[e] - s.k0_coupling[e]
+        s.dk_coupling[e] = s.kc[e] - s.k0_coupling[e]
     for e in range(rows):
         coupled = s.dk_coupling[e] != 0.0 or (e > 0 and s.dk_coupling[e - 1] != 0.0)
         if s.dk[e] != 0.0 or coupled:
@@ -180,20 +198,20 @@ def newton_direction(s: Any, level: int) -> None:
         i = int(s.active[a])
         for b in range(n):
             j = int(s.active[b])
-            s.J[a, b] = column_of_FdK(s, level, i, j)
+            s.J[a, b] = entry_of_FdK(s, level, i, j)
         s.J[a, a] += 1.0
-        s.rhs[a] = -s.g[i]
-    gauss(s.J, s.rhs, n)
+        s.rhs[a, 0] = -s.g[i]
+    solve_dense(s.J[:n, :n], s.rhs[:n])
     for b in range(n):
         j = int(s.active[b])
         for i in range(rows):
-            s.correction[i] -= column_of_FdK(s, level, i, j) * s.rhs[b]
+            s.correction[i] -= entry_of_FdK(s, level, i, j) * s.rhs[b, 0]
     for a in range(n):
-        s.correction[int(s.active[a])] = s.rhs[a]
+        s.correction[int(s.active[a])] = s.rhs[a, 0]
 
 
-def column_of_FdK(s: Any, level: int, i: int, j: int) -> float:
-    """Entry (i, j) of F dK; dK couples the two rows of a segment."""
+def entry_of_FdK(s: Any, level: int, i: int, j: int) -> float:
+    """Return entry (i, j) of F dK; dK couples the two rows of a pair."""
     value: float = s.F[level, i, j] * s.dk[j]
     if s.dk_coupling[j] != 0.0:
         value += s.F[level, i, j + 1] * s.dk_coupling[j]
@@ -202,31 +220,8 @@ def column_of_FdK(s: Any, level: int, i: int, j: int) -> float:
     return value
 
 
-def gauss(A: Array, b: Array, n: int) -> None:
-    """Solve the leading n x n system in place, with partial pivoting."""
-    for k in range(n):
-        pivot = k
-        for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(k, n):
-                A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
-            b[k], b[pivot] = b[pivot], b[k]
-        for i in range(k + 1, n):
-            if A[i, k] != 0.0:
-                ratio = A[i, k] / A[k, k]
-                for j in range(k + 1, n):
-                    A[i, j] -= ratio * A[k, j]
-                b[i] -= ratio * b[k]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            b[i] -= A[i, j] * b[j]
-        b[i] /= A[i, i]
-
-
 def trial(s: Any, h: float, level: int) -> float:
-    """The step from the state at its start; returns the residual left by Newton."""
+    """Take a step from the present state; return the residual of (3) that Newton's method leaves."""
     n = s.M.shape[0]
     rows = s.k0.shape[0]
     for j in range(n):
@@ -246,12 +241,12 @@ def trial(s: Any, h: float, level: int) -> float:
         newton_direction(s, level)
         before = left
         share = 1.0
-        for _ in range(6):  # damped where the full step makes it worse
+        for _ in range(6):  # a shorter correction where the full one makes it worse
             for e in range(rows):
                 s.d1[e] += share * s.correction[e]
             elements(s, h)
             left = residual(s, level)
-            if left < before or share <= 1.0 / 32.0:
+            if left < before or share <= LAST_DAMPING:
                 break
             for e in range(rows):
                 s.d1[e] -= share * s.correction[e]
@@ -260,7 +255,7 @@ def trial(s: Any, h: float, level: int) -> float:
 
 
 def event_error(s: Any) -> float:
-    """Work the mean forces would do over the step, less the work along the elements' paths."""
+    """Return the work of the mean forces over the step less the work along the paths of the elements."""
     work = 0.0
     for e in range(s.k0.shape[0]):
         work += 0.5 * (s.f[e] + s.f1[e]) * (s.d1[e] - s.d[e])
@@ -269,7 +264,7 @@ def event_error(s: Any) -> float:
 
 
 def accept(s: Any, h: float, level: int) -> None:
-    """Make the trial the state, with the displacements it implies and the energies."""
+    """Make the trial the present state, with the displacements that it implies and the energies."""
     n = s.M.shape[0]
     rows = s.k0.shape[0]
     for j in range(n):
@@ -309,7 +304,7 @@ def accept(s: Any, h: float, level: int) -> None:
             s.z[e, m] = s.z1[e, m]
         strain -= 0.5 * s.k0[e] * s.d[e] * s.d[e]
     for e in range(rows):
-        if int(s.kind[e]) == SEGMENT:
+        if s.k0_coupling[e] != 0.0:
             strain -= s.k0_coupling[e] * s.d[e] * s.d[e + 1]
     s.stored = s.stored1
     s.E_hysteretic += s.lost1
@@ -318,7 +313,7 @@ def accept(s: Any, h: float, level: int) -> None:
 
 
 def loads(s: Any) -> None:
-    """The loads that the inputs held over the step put on the structure."""
+    """Write the loads of the inputs, which are held over the step."""
     n = s.M.shape[0]
     for j in range(n):
         pull = 0.0
@@ -334,7 +329,7 @@ def loads(s: Any) -> None:
 
 
 def advance(s: Any, t: float, h: float) -> None:
-    """From t to t + h, in as many bisections as the elements need."""
+    """Carry the structure from t to t + h, in as many bisections as the elements need."""
     if h != s.h_ready:
         prepare(s, h)
     loads(s)
@@ -362,10 +357,10 @@ def advance(s: Any, t: float, h: float) -> None:
 
 
 def measure(s: Any) -> None:
-    """Write the outputs: displacements, absolute accelerations, elements, energies.
+    """Write the outputs.
 
-    Absolute acceleration: M (x'' + I a_g) = p_control - C x' - K x - B r, with the
-    control force held over the step that ends now.
+    The absolute acceleration follows from M (x'' + I a_g) = p_control - C x' - K x - B r
+    with the control force that was held over the step that ends now.
     """
     n = s.M.shape[0]
     rows = s.k0.shape[0]
@@ -389,8 +384,8 @@ def measure(s: Any) -> None:
     for e in range(rows):
         s.deformation[e] = s.d[e]
         s.force[e] = s.f[e]
-        s.plastic[e] = s.z[e, 3]
-        s.yielding[e] = s.z[e, 1]
+        s.plastic[e] = s.z[e, PLASTIC]
+        s.yielding[e] = s.z[e, YIELDING]
         s.dissipated[e] = s.E_lost[e]
     for i in range(s.u.shape[0]):
         s.stroke[i] = row_times(s, rows + i, s.x)
@@ -401,7 +396,7 @@ def measure(s: Any) -> None:
     s.energy[3] = s.E_strain
     s.energy[4] = s.E_damping
     s.energy[5] = s.E_hysteretic
-    if s.failure[0] >= 0.0:  # told at the last point; what follows is no solution, and stops the master
+    if s.failure[0] >= 0.0:  # reported at the last point; NaN from now on ends the run
         for i in range(s.y.shape[0]):
             s.y[i] = nan
     s.failure[0] = s.failed_element

@@ -1,10 +1,12 @@
-"""A classically damped structure without damper, in its real modes (thesis.txt, (2.1)).
+"""A classically damped structure in its real modes.
 
-    eta_j'' + d_j eta_j' + w_j eta_j = phi_j' f,  x = sum phi_j eta_j
+    M x'' + C x' + K x = f                                          (1), the thesis' (2.1)
+    eta_j'' + d_j eta_j' + w_j eta_j = phi_j' f,  x = sum phi_j eta_j               (2)
 
-`advance` is exact for forces held over the step, for under-, critically and overdamped
-modes: with s = d/2 and p = w - s^2, the functions cos(sqrt(p) h) and sin(sqrt(p) h)/sqrt(p)
-continue to negative p as cosh and sinh.
+with w_j = omega_j^2 and d_j = 2 zeta_j omega_j. `advance` is exact for forces held over
+the step, for under-, critically and overdamped modes: with s = d/2 and p = w - s^2, the
+functions cos(sqrt(p) h) and sin(sqrt(p) h)/sqrt(p) continue to negative p as cosh and
+sinh.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ import numpy as np
 
 from cosim import Array, Continuous, Input, Local, Output, Parameter, State
 from cosim.functions import transposed_matvec
-from scenarios.tall_building.building import Structure, StructureError, modes_of
+
+from ..structures.structure import Structure, modes_of, require_freedoms
 
 
 class ModalStructure(Continuous):
@@ -41,9 +44,11 @@ class ModalStructure(Continuous):
         der_eta: Array
         der_eta_dot: Array
 
-    g = Local(shape="n", meaning="modal forces of w")
+    g = Local(shape="n", meaning="phi' w")
     hold_step = Local(0.0, "step that hold belongs to", unit="s")
-    hold = Local(shape=(5, "n"), meaning="2 x 2 transition by mode")
+    hold = Local(shape=(4, "n"), meaning="transition (2 x 2, by row) of each mode over the step")
+
+    CACHE_KEYS = ("hold_step",)
 
     def derivatives(self, t: float) -> None:
         transposed_matvec(self.shapes, self.w, self.g)
@@ -76,12 +81,10 @@ class ModalStructure(Continuous):
             self.eta_dot[j] = self.hold[2, j] * away + self.hold[3, j] * speed
 
     @classmethod
-    def of(cls, structure: Structure, floors: Sequence[int], stiffness: float = 1.0) -> ModalStructure:
-        """Make the plant of a structure; floors: DOF with outputs, counted from 1."""
+    def build(cls, structure: Structure, floors: Sequence[int], stiffness: float = 1.0) -> ModalStructure:
+        """Make the plant of a structure; floors: degrees of freedom with outputs, counted from 1."""
+        require_freedoms("ModalStructure", floors, structure.dof)
         modes = modes_of(structure)
-        outside = [f for f in floors if not 1 <= f <= structure.dof]
-        if outside or not len(floors):
-            raise StructureError(f"ModalStructure: floors {list(floors)} must be some of 1..{structure.dof}")
         rows = np.asarray(floors, int) - 1
         return cls(
             omega2=modes.omega**2, damping=modes.damping, shapes=modes.shapes,
@@ -90,7 +93,7 @@ class ModalStructure(Continuous):
 
 
 def modal_hold(w: float, d: float, h: float, out: Array) -> None:
-    """out[:4] = transition of (eta - static, eta') over h for eta'' + d eta' + w eta = const."""
+    """Write to `out` the transition of (eta - static, eta') over h under a constant force."""
     s = 0.5 * d
     p = w - s * s
     root = math.sqrt(abs(p))

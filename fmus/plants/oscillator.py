@@ -1,11 +1,12 @@
-"""The oscillator of chapter 4 (thesis.txt, 4.1): mass, damper and spring, driven by a control force.
+"""The oscillator of the thesis' chapter 4: mass, damper and spring, driven by a control force.
 
     x' = v
     v' = (u - c v - k x) / m + d
     a  = v'
 
-u is the control force, d a disturbance that enters as an acceleration. With the thesis'
-m = 1 this is its x2' = -(k/m) x1 - (c/m) x2 + u + d.
+u is the control force, d a disturbance that enters as an acceleration. With m = 1 this is
+the thesis' x2' = -(k/m) x1 - (c/m) x2 + u + d (section 4.1), whose numbers are the
+defaults.
 """
 
 from __future__ import annotations

@@ -6,12 +6,12 @@
     equation of floor  m_i x''_i = f_i - (C x')_i - q_i + q_{i+1} - m_i a_g
 
 x is relative to the ground. Outputs: accelerations relative (x'') and absolute (x'' + a_g),
-drifts x_i - x_{i-1}, base shear q_1. Inputs are held over a step, which is exact for any
-step (LinearContinuous). Masses and stiffnesses may be set before a run; the damping matrix
-is worked out when the building is made, and stays:
+drifts x_i - x_{i-1}, base shear q_1. The step is exact for inputs held over it
+(LinearContinuous). Masses and stiffnesses may be set before a run; the damping matrix
+follows from those that the building is made with, and stays:
 
-    ShearBuilding.with_modal_damping(m, k, ratio)      the same or one ratio for each mode
-    ShearBuilding.with_rayleigh_damping(m, k, ratio)   C = a M + b K, `ratio` at two modes
+    ShearBuilding.build(m, k, ratio)                      modal damping, one ratio or one for each mode
+    ShearBuilding.build(m, k, ratio, rayleigh=(1, 2))     C = a M + b K, `ratio` at two modes
 """
 
 from __future__ import annotations
@@ -63,28 +63,33 @@ class ShearBuilding(LinearContinuous):
         self.base_shear = self.k[0] * self.drift[0]
 
     @classmethod
-    def with_modal_damping(cls, m: ArrayLike, k: ArrayLike, ratio: ArrayLike) -> Self:
-        """C = M Phi diag(2 zeta_i omega_i) Phi' M, with Phi' M Phi = 1."""
-        masses, stiffness, omega, modes = _modes(m, k)
-        zeta = np.broadcast_to(np.asarray(ratio, dtype=float), omega.shape)
-        scaled = np.diag(masses) @ modes
-        return cls(m=masses, k=stiffness, C=(scaled * (2.0 * zeta * omega)) @ scaled.T)
-
-    @classmethod
-    def with_rayleigh_damping(
-        cls, m: ArrayLike, k: ArrayLike, ratio: float, modes: tuple[int, int] = (1, 2)
+    def build(
+        cls, m: ArrayLike, k: ArrayLike, ratio: ArrayLike, *, rayleigh: tuple[int, int] | None = None
     ) -> Self:
-        """C = a M + b K with a/(2 omega) + b omega/2 = ratio at two modes, counted from 1."""
-        masses, stiffness, omega, _ = _modes(m, k)
-        if not 1 <= min(modes) < max(modes) <= omega.size:
-            raise DeclarationError(f"Rayleigh damping at modes {modes}: give two modes of 1 to {omega.size}")
-        first, second = omega[modes[0] - 1], omega[modes[1] - 1]
-        a, b = 2.0 * ratio * first * second / (first + second), 2.0 * ratio / (first + second)
+        """Make the building of floors m and stories k with damping ratios.
+
+        Without `rayleigh`, C = M Phi diag(2 zeta_i omega_i) Phi' M, with Phi' M Phi = 1 and one
+        ratio or one for each mode. With two modes, counted from 1, C = a M + b K with
+        a/(2 omega) + b omega/2 = ratio at both.
+        """
+        masses, stiffness, omega, modes = _modes(m, k)
+        if rayleigh is None:
+            zeta = np.broadcast_to(np.asarray(ratio, dtype=float), omega.shape)
+            scaled = np.diag(masses) @ modes
+            return cls(m=masses, k=stiffness, C=(scaled * (2.0 * zeta * omega)) @ scaled.T)
+        if not 1 <= min(rayleigh) < max(rayleigh) <= omega.size or np.ndim(ratio):
+            raise DeclarationError(
+                f"ShearBuilding: Rayleigh damping takes one ratio and two modes of 1 to {omega.size}, "
+                f"not ratio {ratio!r} at modes {rayleigh}"
+            )
+        zeta = np.asarray(ratio, dtype=float)
+        first, second = omega[rayleigh[0] - 1], omega[rayleigh[1] - 1]
+        a, b = 2.0 * zeta * first * second / (first + second), 2.0 * zeta / (first + second)
         return cls(m=masses, k=stiffness, C=a * np.diag(masses) + b * stiffness_matrix(stiffness))
 
 
 def stiffness_matrix(k: Array) -> Array:
-    """K of stories with stiffness k, the first between ground and first floor."""
+    """Return K of stories with stiffness k, the first between ground and first floor."""
     above = np.append(k[1:], 0.0)
     return np.diag(k + above) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
 
@@ -93,8 +98,10 @@ def _modes(m: ArrayLike, k: ArrayLike) -> tuple[Array, Array, Array, Array]:
     """Return masses, stiffnesses, frequencies in rad/s (ascending) and modes with Phi' M Phi = 1."""
     masses, stiffness = np.atleast_1d(np.asarray(m, float)), np.atleast_1d(np.asarray(k, float))
     if masses.shape != stiffness.shape or masses.ndim != 1:
-        raise DeclarationError(f"{masses.shape} masses, {stiffness.shape} stiffnesses: one of each per story")
+        raise DeclarationError(
+            f"ShearBuilding: {masses.size} masses and {stiffness.size} stiffnesses; give one per story"
+        )
     if not ((masses > 0.0).all() and (stiffness > 0.0).all()):
-        raise DeclarationError("masses and stiffnesses of a building are above zero")
+        raise DeclarationError("ShearBuilding: masses and stiffnesses must be above zero")
     squares, modes = eigh(stiffness_matrix(stiffness), np.diag(masses))
     return masses, stiffness, np.sqrt(squares), modes

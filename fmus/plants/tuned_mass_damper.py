@@ -1,12 +1,12 @@
-"""The active tuned mass damper as a plant of its own (thesis.txt, (2.19)).
+"""An active tuned mass damper as a plant of its own (the thesis' (2.19)).
 
     m y'' = u - k (y - x_top) - c (y' - v_top),  x_m = y - x_top
-    reaction on the top floor: k x_m + c x_m' - u
+    reaction on the floor: k x_m + c x_m' - u
 
-y is the position of the mass in space. Coupled to a building by motion (x_top, v_top)
-and force, each held over a communication step; the coupling error against the one plant
-`DampedTower` falls with the step (scenarios/tall_building.py reports it). Exact for held
-inputs.
+y is the position of the mass in space. The damper is coupled to a building by motion
+(x_top, v_top) and force, each held over a communication step; the error against the one
+plant `DampedTower` falls with the step (the study of the tall building reports it). The
+step itself is exact for held inputs.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from cosim import Input, LinearContinuous, Output, Parameter, State
 class TunedMassDamper(LinearContinuous):
     """m y'' = u - k (y - x_top) - c (y' - v_top)"""
 
-    m = Parameter(500.0e3, "mass", unit="kg", min=1.0)
-    c = Parameter(201.0e3, "damping", unit="N*s/m", min=0.0)
-    k = Parameter(505.1e3, "stiffness", unit="N/m", min=0.0)
+    m = Parameter(1.0, "mass", unit="kg", min=1e-12)
+    c = Parameter(0.0, "damping", unit="N*s/m", min=0.0)
+    k = Parameter(1.0, "stiffness", unit="N/m", min=0.0)
     x_top = Input("displacement of the floor below", unit="m")
     v_top = Input("velocity of the floor below", unit="m/s")
     u = Input("force of the actuator on the mass", unit="N")

@@ -1,13 +1,14 @@
 """Straight frame members along a global axis, with shear flexibility, and their assembly.
 
-A member of length L bends in two planes; in each, with k_s its shear and
+A member of length L bends in two planes. In each, its end moments follow from the
+rotations of its ends from the chord by
 
-    phi = 12 EI / (GA L^2)                     share of shear in its flexibility
-    k_11 = (4 + phi) EI / (L (1 + phi)),  k_12 = (2 - phi) EI / (L (1 + phi))
-    k_s = (k_11 + k_12) / L,  transverse stiffness 2 k_s / L
+    m_1 = k11 theta_1 + k12 theta_2,  m_2 = k12 theta_1 + k11 theta_2
+    k11 = (4 + phi) EI / (L (1 + phi)),  k12 = (2 - phi) EI / (L (1 + phi))
+    phi = 12 EI / (GA L^2), the share of shear in its flexibility
 
-Nodes have the degrees of freedom ux, uy, uz, rx, ry, rz; those left out of a node are
-fixed.
+Nodes have the degrees of freedom ux, uy, uz, rx, ry, rz; those that a node is not given
+are fixed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from cosim import Array
+
+from .structure import Freedoms
 
 AXES = "xyz"
 FREEDOMS = ("ux", "uy", "uz", "rx", "ry", "rz")
@@ -23,22 +27,22 @@ FREEDOMS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 @dataclass(frozen=True)
 class Section:
-    """Stiffness of a section; EI_rz is bending about z (motion in the plane across z)."""
+    """Stiffness of a section."""
 
-    EA: float
-    GJ: float
-    EI: dict[str, float]  # by axis of rotation: {"x": ..., "z": ...}
-    GA: dict[str, float]  # by direction of the shear
+    EA: float  # axial, N
+    GJ: float  # torsional, N*m^2
+    EI: dict[str, float]  # bending, by axis of rotation ({"x": ..., "z": ...}), N*m^2
+    GA: dict[str, float]  # shear, by direction, N
 
 
 def end_stiffness(EI: float, GA: float, L: float) -> tuple[float, float]:
-    """k_11 and k_12: end moments of unit rotations at the near and the far end."""
+    """Return k11 and k12: moments of a unit rotation, at its own and at the other end."""
     phi = 12.0 * EI / (GA * L * L)
     return (4.0 + phi) * EI / (L * (1.0 + phi)), (2.0 - phi) * EI / (L * (1.0 + phi))
 
 
-def member(axis: str, L: float, section: Section) -> NDArray[np.float64]:
-    """Stiffness (12, 12) of a member from node 1 to node 2, which lies L further along the axis."""
+def member(axis: str, L: float, section: Section) -> Array:
+    """Return the stiffness (12, 12) of a member; node 2 lies L further along the axis than node 1."""
     K = np.zeros((12, 12))
     a = AXES.index(axis)
     pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -53,8 +57,8 @@ def member(axis: str, L: float, section: Section) -> NDArray[np.float64]:
     return K
 
 
-def chord_rotations(axis: str, direction: str, L: float) -> NDArray[np.float64]:
-    """Rotations (2, 12) of a member's ends from its chord, bending along `direction`.
+def chord_rotations(axis: str, direction: str, L: float) -> Array:
+    """Return the rotations (2, 12) of a member's ends from its chord, bending along `direction`.
 
     A small rotation r about the third axis moves a point that lies L further along the
     axis by r x (L axis): +L r along `direction` where (rotation, axis, direction) is an
@@ -71,49 +75,37 @@ def chord_rotations(axis: str, direction: str, L: float) -> NDArray[np.float64]:
 
 
 class Frame:
-    """Nodes, members, springs and dashpots, assembled to M, C and K."""
+    """Nodes and members, assembled to M and K; springs and dashpots are added to the matrices."""
 
     def __init__(self) -> None:
-        self.index: dict[tuple[str, str], int] = {}
-        self.members: list[tuple[str, str, NDArray[np.float64]]] = []
+        self.freedoms: Freedoms[str, str] = Freedoms()
+        self.members: list[tuple[str, str, Array]] = []
         self.mass: dict[tuple[str, str], float] = {}
 
     def node(self, name: str, freedoms: tuple[str, ...] = FREEDOMS) -> None:
+        """Add a node with these degrees of freedom; the others are fixed."""
         for freedom in freedoms:
-            self.index[name, freedom] = len(self.index)
+            self.freedoms[name, freedom] = len(self.freedoms)
 
     def add_mass(self, name: str, translation: float, rotation: tuple[float, float, float]) -> None:
+        """Add a mass (kg) with its inertia about x, y, z (kg*m^2) to a node."""
         for freedom, value in zip(FREEDOMS, (translation,) * 3 + rotation, strict=True):
             self.mass[name, freedom] = self.mass.get((name, freedom), 0.0) + value
 
     def connect(self, first: str, second: str, axis: str, L: float, section: Section) -> None:
+        """Add a member of length L from one node to another, which lies further along the axis."""
         self.members.append((first, second, member(axis, L, section)))
 
-    @property
-    def size(self) -> int:
-        return len(self.index)
-
-    def row(self, weights: dict[tuple[str, str], float]) -> NDArray[np.float64]:
-        """A row over all degrees of freedom; fixed ones are left out."""
-        row = np.zeros(self.size)
-        for key, weight in weights.items():
-            if key in self.index:
-                row[self.index[key]] += weight
-        return row
-
-    def end_rows(self, first: str, second: str, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows over the 12 freedoms of a member as rows over all."""
+    def end_rows(self, first: str, second: str, rows: Array) -> Array:
+        """Return rows over the 12 freedoms of a member as rows over all degrees of freedom."""
         keys = [(node, freedom) for node in (first, second) for freedom in FREEDOMS]
-        return np.array([self.row(dict(zip(keys, row, strict=True))) for row in rows])
+        return np.array([self.freedoms.row(dict(zip(keys, row, strict=True))) for row in rows])
 
-    def matrices(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lumped masses (n) and the stiffness of the members (n, n)."""
-        K = np.zeros((self.size, self.size))
+    def matrices(self) -> tuple[Array, Array]:
+        """Return the lumped masses and the stiffness of the members, both (n, n)."""
+        n = len(self.freedoms)
+        K = np.zeros((n, n))
         for first, second, k in self.members:
             T = self.end_rows(first, second, np.eye(12))
             K += T.T @ k @ T
-        M = np.array([self.mass.get(key, 0.0) for key in self.index])
-        return M, K
-
-    def influence(self, directions: tuple[str, ...] = ("ux", "uy")) -> NDArray[np.float64]:
-        return np.array([[float(f == d) for d in directions] for _, f in self.index])
+        return np.diag([self.mass.get(key, 0.0) for key in self.freedoms]), K

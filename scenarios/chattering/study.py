@@ -34,7 +34,7 @@ from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.algorithm_2 import AlgorithmII
 from controllers.laws.constant_gain import ConstantGain
 from controllers.laws.equivalent_control import EquivalentControlGain
-from controllers.laws.sliding_surface import SlidingSurface
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from controllers.laws.state_dependent import StateDependentGain
 from controllers.laws.switching import HysteresisControl, SaturationControl
 from cosim import Block, G, Result, System, el_centro, simulate
@@ -167,7 +167,7 @@ def build(
     law = this.tuned if gain == "tuned" else gain
     oscillator = Oscillator()
     system = System({"plant": as_fmu(oscillator) if plant == "fmu" else oscillator})
-    system.add("surface", SlidingSurface())
+    system.add("surface", PhasePlaneSurface())
     system.add("control", gain_law(this, law))
     system.connect("plant.x", "surface.x1")
     system.connect("plant.v", "surface.x2")

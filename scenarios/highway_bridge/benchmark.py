@@ -14,7 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.plants.nonlinear_structure import Element, NonlinearStructure, bilinear, segment
+from fmus.elements.bilinear import bilinear
+from fmus.elements.column_segment import column_segment
+from fmus.elements.element import Element
+from fmus.plants.nonlinear_structure import NonlinearStructure
+from fmus.structures.structure import Structure
 
 #: degrees of freedom of the deck over the bent, x and y: found by comparing with the
 #: benchmark's own midspan histories
@@ -41,13 +45,11 @@ def benchmark_bridge(
             rotations = flexibility @ moments[list(ends)]
             rotations[np.abs(rotations) < 1e-9 * np.abs(rotations).max()] = 0.0
             elements.append(
-                segment(
+                column_segment(
                     rotations, k11, k12, float(data["EI"]), float(data["EI1"]), float(data["MP"]), late_events
                 )
             )
     at = np.eye(len(M))
-    return NonlinearStructure.build(
-        M, C, K, data["I1"], elements,
-        actuators=bearings, displacements=at[list(MIDSPAN)], accelerations=at[[*MIDSPAN, *ENDS]],
-        bisections=bisections,
-    )  # fmt: skip
+    displacements, accelerations = at[list(MIDSPAN)], at[[*MIDSPAN, *ENDS]]
+    structure = Structure(np.diag(M), C, K, data["I1"], bearings, displacements, accelerations)
+    return NonlinearStructure.build(structure, elements, bisections=bisections)

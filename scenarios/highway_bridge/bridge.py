@@ -18,8 +18,12 @@ from itertools import pairwise
 import numpy as np
 
 from cosim import Array
-from fmus.plants.nonlinear_structure import Element, NonlinearStructure, bilinear, segment
+from fmus.elements.bilinear import bilinear
+from fmus.elements.column_segment import column_segment
+from fmus.elements.element import Element
+from fmus.plants.nonlinear_structure import NonlinearStructure
 from fmus.structures.frame import FREEDOMS, Frame, Section, chord_rotations, end_stiffness
+from fmus.structures.structure import Structure
 
 SPAN, DECK_MEMBERS = 58.52, 4  # m, members a span
 DECK = Section(1.7424e11, 9.036e10, {"x": 1.474e11, "z": 1.5158e12}, {"x": 6.32e10, "z": 7.41e10})
@@ -67,18 +71,16 @@ def highway_bridge(*, late_events: bool = False, bisections: int = 5) -> Nonline
         mass, inertia = ABUTMENTS[end][:2]
         frame.add_mass(f"abutment{end}", mass, (0.0, 0.0, inertia))
     M, K = frame.matrices()
-    C = ALPHA * np.diag(M) + BETA * K
+    C = ALPHA * M + BETA * K
     _soil(frame, C, K)
     elements = [*_bearings(frame), *_segments(frame, late_events)]
     for element in elements[:16]:
         K += element.k0 * element.rows.T @ element.rows
     places = [f"deck{i}" for i in (0, -DECK_MEMBERS, DECK_MEMBERS)]
-    at = np.array([frame.row({(place, d): 1.0}) for place in places for d in ("ux", "uy")])
+    at = np.array([frame.freedoms.row({(place, d): 1.0}) for place in places for d in ("ux", "uy")])
     actuators = np.vstack([e.rows for e in elements[:16]])
-    return NonlinearStructure.build(
-        M, C, K, frame.influence(), elements,
-        actuators=actuators, displacements=at[:2], accelerations=at, bisections=bisections,
-    )  # fmt: skip
+    structure = Structure(M, C, K, frame.freedoms.rigid_motion(("ux", "uy")), actuators, at[:2], at)
+    return NonlinearStructure.build(structure, elements, bisections=bisections)
 
 
 def _deck(frame: Frame) -> None:
@@ -127,7 +129,7 @@ def _column_nodes(side: int) -> list[str]:
 def _soil(frame: Frame, C: Array, K: Array) -> None:
     for side in range(2):
         base = _column_nodes(side)[-1]
-        at = {f: frame.index[base, f] for f in FREEDOMS}
+        at = {f: frame.freedoms[base, f] for f in FREEDOMS}
         for freedom, k in PILES.items():
             K[at[freedom], at[freedom]] += k
             C[at[freedom], at[freedom]] += PILES_DASHPOT.get(freedom, 0.0)
@@ -137,7 +139,7 @@ def _soil(frame: Frame, C: Array, K: Array) -> None:
             K[j, i] += sign * PILES_COUPLING
     for end, (_, _, k, k_r, c_x, c_y, c_r) in enumerate(ABUTMENTS):
         for freedom, spring, dashpot in (("ux", k, c_x), ("uy", k, c_y), ("rz", k_r, c_r)):
-            i = frame.index[f"abutment{end}", freedom]
+            i = frame.freedoms[f"abutment{end}", freedom]
             K[i, i] += spring
             C[i, i] = dashpot
 
@@ -151,7 +153,7 @@ def _bearings(frame: Frame) -> list[Element]:
             for translation, lever in (("ux", -y), ("uy", x)):
                 row = {(deck, translation): 1.0, (deck, "rz"): lever}
                 row |= {(abutment, translation): -1.0, (abutment, "rz"): -lever}
-                elements.append(bilinear(frame.row(row), *BEARING))
+                elements.append(bilinear(frame.freedoms.row(row), *BEARING))
     return elements
 
 
@@ -163,5 +165,5 @@ def _segments(frame: Frame, late_events: bool) -> list[Element]:
         for upper, below in pairwise(names):
             for direction in ("y", "x"):
                 rows = frame.end_rows(below, upper, chord_rotations("z", direction, SEGMENT))[::-1]
-                elements.append(segment(rows, k11, k12, EI, EI1, M_Y, late_events))
+                elements.append(column_segment(rows, k11, k12, EI, EI1, M_Y, late_events))
     return elements

@@ -21,8 +21,8 @@ from typing import Literal
 import numpy as np
 
 from controllers.adaptive.scwnn import SCWNN
-from controllers.design.condensation import StateSpace
-from controllers.design.modal_truncation import modal_state_space
+from controllers.design.reduction import modal_state_space
+from controllers.design.state_space import StateSpace
 from controllers.laws.state_feedback import StateFeedback
 from controllers.laws.viscous_dampers import ViscousDampers
 from controllers.observers.kinematic_observer import KinematicObserver
@@ -119,7 +119,7 @@ def _sensors(system: System, name: str, sources: list[str], reach: float, unit: 
 
 
 def _network(system: System, seed: int, parameters: dict[str, float]) -> None:
-    system.add("control", SCWNN.of_size(BEARINGS, NODES, **parameters))
+    system.add("control", SCWNN.design(BEARINGS, NODES, **parameters))
     every = range(1, BEARINGS + 1)
     strokes, rates = [f"bridge.stroke[{i}]" for i in every], [f"bridge.stroke_rate[{i}]" for i in every]
     system.connect(_sensors(system, "displacement", strokes, DISPLACEMENT_RANGE, "m", seed), "control.x")
@@ -128,10 +128,10 @@ def _network(system: System, seed: int, parameters: dict[str, float]) -> None:
 
 def _network_behind_observer(system: System, bridge: NonlinearStructure, seed: int) -> None:
     rows = bridge.linear_model().actuators
-    system.add("observer", KinematicObserver.of_rigid_parts(rows, rows[list(SENSORS)]))
+    system.add("observer", KinematicObserver.design(rows, rows[list(SENSORS)]))
     strokes = [f"bridge.stroke[{i + 1}]" for i in SENSORS]
     system.connect(_sensors(system, "displacement", strokes, DISPLACEMENT_RANGE, "m", seed), "observer.y")
-    system.add("control", SCWNN.of_size(BEARINGS, NODES))
+    system.add("control", SCWNN.design(BEARINGS, NODES))
     system.connect("observer.x", "control.x")
     system.connect("observer.v", "control.v")
 
@@ -152,7 +152,7 @@ def _lqg(system: System, bridge: NonlinearStructure, seed: int) -> None:
     weight = np.diag([0.1**-2.0] * BEARINGS + [0.05**-2.0] * (n - BEARINGS))
     seen = model.C[:n]
     R = np.eye(BEARINGS) / LIMIT**2
-    feedback = StateFeedback.lqg(model, seen.T @ weight @ seen, R)
+    feedback = StateFeedback.lqr(model, seen.T @ weight @ seen, R)
     measured = list(LQG_SENSORS)
     sensed = StateSpace(
         A=model.A, B=model.B, E=np.hstack([model.E, model.B]),

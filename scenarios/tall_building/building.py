@@ -26,7 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cosim import Array, CosimError
+from cosim import Array
+from fmus.structures.structure import Structure, StructureError
 
 STORY_HEIGHTS: Array = np.concatenate([[10.0], [4.5] * 2, [3.9] * 35, [4.5] * 2, [3.9] * 34, [4.5] * 2])
 """Story heights from the ground up, m: 76 stories, 306.1 m."""
@@ -42,85 +43,6 @@ MASS_PER_METRE: tuple[float, ...] = (910.9e3, 785.8e3, 605.5e3, 469.9e3)
 
 ROOF_MASS = 747.1e3
 """Plant rooms on the top floor, kg."""
-
-
-class StructureError(CosimError):
-    """Matrices that are no structure, or not one that a plant can take."""
-
-
-@dataclass(frozen=True)
-class Structure:
-    """Linear structure M x'' + C x' + K x = f (2.1); kg, N s/m, N/m, all (n, n)."""
-
-    M: Array
-    C: Array
-    K: Array
-
-    def __post_init__(self) -> None:
-        n = self.M.shape[0]
-        for name, matrix in (("M", self.M), ("C", self.C), ("K", self.K)):
-            if matrix.shape != (n, n):
-                raise StructureError(
-                    f"structure: {name} has shape {matrix.shape}, M has {self.M.shape}; "
-                    "M, C and K must be square and of one size"
-                )
-            if not np.isfinite(matrix).all():
-                raise StructureError(f"structure: {name} contains NaN or infinite entries")
-
-    @property
-    def dof(self) -> int:
-        """Number of degrees of freedom."""
-        return int(self.M.shape[0])
-
-
-@dataclass(frozen=True)
-class Modes:
-    """Undamped modes of a classically damped structure, mass-normalised.
-
-    shapes (n, n): column i is mode i, shapes' M shapes = I; omega (n,) in rad/s,
-    ascending; damping (n,): 2 zeta omega in rad/s.
-    """
-
-    shapes: Array
-    omega: Array
-    damping: Array
-
-    @property
-    def frequency(self) -> Array:
-        """Natural frequencies, Hz."""
-        return self.omega / (2.0 * np.pi)
-
-    @property
-    def ratio(self) -> Array:
-        """Damping ratios zeta."""
-        return self.damping / (2.0 * self.omega)
-
-
-def modes_of(structure: Structure, tolerance: float = 1e-6) -> Modes:
-    """Modes of M, K with the modal damping of C; refuses a C that couples them.
-
-    tolerance: largest off-diagonal entry of shapes' C shapes, relative to
-    the geometric mean of the two diagonal entries it couples.
-    """
-    omega2, shapes = la.eigh(structure.K, structure.M)
-    if omega2[0] <= 0.0:
-        raise StructureError(
-            f"structure: K is not positive definite (lowest omega^2 = {omega2[0]:.3g}); "
-            "a fixed base is needed"
-        )
-    modal = shapes.T @ structure.C @ shapes
-    damping = np.diag(modal).copy()
-    scale = np.sqrt(np.outer(damping, damping)) if (damping > 0).all() else damping.max() + 1.0
-    coupling = np.abs(modal - np.diag(damping)) / scale
-    if coupling.max() > tolerance:
-        i, j = np.unravel_index(int(np.argmax(coupling)), coupling.shape)
-        raise StructureError(
-            f"structure: C couples modes {i + 1} and {j + 1} "
-            f"(relative {coupling.max():.2g} > {tolerance:g}); the modal step needs classical "
-            "damping, use a dense matrix exponential for this C"
-        )
-    shapes = shapes * np.sign(shapes[-1])
-    return Modes(shapes, np.sqrt(omega2), damping)
 
 
 def cantilever_stiffness(heights: Array, bending_stiffness: Array) -> Array:
@@ -189,7 +111,8 @@ def load_building(path: str) -> Structure:
                     f"{path}: no array {sorted(missing)} (found {sorted(data.files)}); "
                     "the file must hold M, C, K in t, kN s/m, kN/m"
                 )
-            return Structure(*(1e3 * np.asarray(data[name], float) for name in ("M", "C", "K")))
+            M, C, K = (1e3 * np.asarray(data[name], float) for name in ("M", "C", "K"))
+            return Structure(M, C, K)
     except (OSError, EOFError, ValueError) as error:
         raise StructureError(f"{path}: not a readable .npz file ({error})") from error
 

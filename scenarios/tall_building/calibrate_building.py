@@ -16,6 +16,7 @@ import scipy.linalg as la
 from scipy.optimize import least_squares
 
 from cosim import Array
+from fmus.structures.structure import Structure
 
 from .building import (
     BENDING_STIFFNESS,
@@ -23,7 +24,6 @@ from .building import (
     ROOF_MASS,
     SECTION_TOPS,
     STORY_HEIGHTS,
-    Structure,
     cantilever_stiffness,
     load_building,
     lumped_mass,

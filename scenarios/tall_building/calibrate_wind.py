@@ -30,8 +30,9 @@ from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from cosim import Array
 from fmus.loads.wind import AcrossWind, across_wind
+from fmus.structures.structure import Modes, modes_of
 
-from .building import STORY_HEIGHTS, Modes, default_building, modes_of
+from .building import STORY_HEIGHTS, default_building
 from .criteria import UNCONTROLLED
 from .study import SEED
 

@@ -23,11 +23,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.design.condensation import StateSpace, dominant_modes
+from controllers.design.reduction import dominant_modes
+from controllers.design.state_space import StateSpace
 from controllers.observers.observer import Observer
 from cosim import Array
+from fmus.structures.structure import Structure
 
-from .building import Damper, Structure, with_damper
+from .building import Damper, with_damper
 
 KEPT = (16, 30, 46, 60, 76)
 MEASURED = (50, 76)

@@ -12,6 +12,7 @@ is the reference.
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from fmus.plants.damped_tower import DampedTower
 from fmus.plants.modal_structure import ModalStructure
 from fmus.plants.tuned_mass_damper import TunedMassDamper
 
-from .building import STORY_HEIGHTS
+from .building import STORY_HEIGHTS, Damper
 
 COUPLINGS: tuple[Coupling, ...] = ("sampled", "iterated")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)
@@ -40,9 +41,12 @@ def coupling_errors(common: dict[str, Any], steps: tuple[float, ...] = STEPS) ->
     span = min(SPAN, common["duration"])
     rows: list[dict[str, Any]] = []
     for step in steps:
-        one = _run({"tower": DampedTower.of(structure, top)}, table, dt, step, span)
+        one = _run({"tower": DampedTower.build(structure, top, **asdict(Damper()))}, table, dt, step, span)
         for coupling in COUPLINGS:
-            plants = {"tower": ModalStructure.of(structure, top), "damper": TunedMassDamper()}
+            plants = {
+                "tower": ModalStructure.build(structure, top),
+                "damper": TunedMassDamper(**asdict(Damper())),
+            }
             two = _run(plants, table, dt, step, span, coupling)
             errors = [
                 float(np.max(np.abs(one[a] - two[b])) / np.max(np.abs(one[a])))

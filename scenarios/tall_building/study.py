@@ -16,14 +16,14 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from functools import lru_cache
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from controllers.design.condensation import StateSpace
+from controllers.design.state_space import StateSpace
 from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.algorithm_2 import AlgorithmII
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
@@ -45,8 +45,9 @@ from fmus.export import as_fmu
 from fmus.loads.wind import FloorLoad, across_wind, load_forces
 from fmus.plants.damped_tower import DampedTower
 from fmus.plants.modal_structure import ModalStructure
+from fmus.structures.structure import Structure
 
-from .building import STORY_HEIGHTS, Structure, default_building, load_building
+from .building import STORY_HEIGHTS, Damper, default_building, load_building
 from .control import CONTINUOUS_RATE, LQG_WEIGHTS, PERIOD, SURFACE_WEIGHTS, reduced_model, tower_observer
 from .criteria import FLOORS, UNITS, Power, Reference, criteria
 
@@ -115,7 +116,7 @@ def uncontrolled(
     structure = building(data)
     table, dt = load(wind, seed, duration, structure.dof)
     system = System(
-        {"load": FloorLoad(table=table, dt=dt), "tower": ModalStructure.of(structure, FLOORS)},
+        {"load": FloorLoad(table=table, dt=dt), "tower": ModalStructure.build(structure, FLOORS)},
         [("load.w", "tower.w")],
     )
     step = PERIOD * LOAD_EVERY
@@ -161,9 +162,9 @@ def build(
     system = System({"load": FloorLoad(table=table, dt=dt, every=LOAD_EVERY)})
     stiffness = 1.0 + stiffness_error
     if controller == "none":
-        tower: Participant = ModalStructure.of(structure, floors, stiffness)
+        tower: Participant = ModalStructure.build(structure, floors, stiffness)
     else:
-        tower = DampedTower.of(structure, floors, stiffness=stiffness)
+        tower = DampedTower.build(structure, floors, stiffness=stiffness, **asdict(Damper()))
     system.add("tower", as_fmu(tower) if plant == "fmu" else tower)
     system.connect("load.w", "tower.w")
     if controller in ("none", "passive"):
@@ -237,7 +238,7 @@ def _add_controller(system: System, controller: Controller, model: StateSpace, a
     Q = SURFACE_WEIGHTS.matrix(model)
     law: Block
     if controller == "lqg":
-        law = StateFeedback.lqg(model, LQG_WEIGHTS.matrix(model), np.array([[LQG_WEIGHTS.R]]))
+        law = StateFeedback.lqr(model, LQG_WEIGHTS.matrix(model), np.array([[LQG_WEIGHTS.R]]))
     elif controller == "continuous-smc":
         law = ContinuousSlidingMode.design(model, Q, CONTINUOUS_RATE)
     elif controller in ("smc", "filtered-smc"):

@@ -19,7 +19,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from controllers.laws.algorithm_1 import AlgorithmI
-from controllers.laws.sliding_surface import SlidingSurface
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from cosim import FMU, Block, System, simulate
 from cosim.blocks import LowPass, SensorDynamics
 from fmus.export import as_fmu
@@ -44,7 +44,7 @@ CONNECTIONS = [
 
 def blocks():
     return {
-        "surface": SlidingSurface(),
+        "surface": PhasePlaneSurface(),
         "sensor": SensorDynamics(mu=0.008),
         "control": AlgorithmI(),
         "filter": LowPass(tau=0.02),

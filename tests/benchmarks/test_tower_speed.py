@@ -17,7 +17,7 @@ import pytest
 import scipy.linalg as la
 from fmpy.fmi2 import FMU2Slave
 
-from controllers.design.condensation import first_order
+from controllers.design.state_space import first_order
 from cosim import FMU, simulate
 from scenarios.tall_building import study as tall_building
 from scenarios.tall_building.building import with_damper

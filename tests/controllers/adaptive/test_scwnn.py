@@ -22,7 +22,7 @@ def test_first_step_is_the_equations_of_the_thesis():
     """One step from given weights against the formulas in NumPy; the same sums, so to rounding."""
     rng = np.random.default_rng(4)
     p, T = 3, 0.005
-    net = SCWNN.of_size(p, 6, g_min=2.0, s_max=5.0, u_max=40.0, eta_sigma=0.0, eta_c=0.0, leak=0.3)
+    net = SCWNN.design(p, 6, g_min=2.0, s_max=5.0, u_max=40.0, eta_sigma=0.0, eta_c=0.0, leak=0.3)
     net.h, net.i = 4.0, 7.0  # four nodes, not the first sample
     for name in ("c", "w", "theta", "b", "r", "integral"):
         view = getattr(net, name)
@@ -57,7 +57,7 @@ def test_centres_and_widths_follow_the_gradient_of_the_wavelets():
     of 1e-6, which leave 1e-8 of it."""
     rng = np.random.default_rng(5)
     p, T, eta = 2, 0.01, 0.7
-    net = SCWNN.of_size(p, 3, eta_sigma=eta, eta_c=eta, eta_pw=0.0, eta_pt=0.0, u_max=1.0)
+    net = SCWNN.design(p, 3, eta_sigma=eta, eta_c=eta, eta_pw=0.0, eta_pt=0.0, u_max=1.0)
     net.h, net.i = 3.0, 5.0
     for name in ("c", "w", "theta"):
         getattr(net, name)[...] = rng.standard_normal(getattr(net, name).shape)
@@ -92,7 +92,7 @@ def test_seven_triangles_sum_to_an_interpolation():
 
 def test_memory_is_fixed_and_says_when_it_is_full():
     """Inputs that never come back want a node each; three fit, the rest is counted."""
-    net = SCWNN.of_size(1, 3, E3=0.0)
+    net = SCWNN.design(1, 3, E3=0.0)
     for k in range(30):
         net.x[0], net.v[0] = 1.0 + k, -k
         net.step(0.0, 0.005)
@@ -121,7 +121,7 @@ class Oscillators(Continuous):
 
 
 def controlled(**rates):
-    net = SCWNN.of_size(2, 30, u_max=10.0, g_min=1.0, k1=2.0, k2=1.0, s_max=1.0, **rates)
+    net = SCWNN.design(2, 30, u_max=10.0, g_min=1.0, k1=2.0, k2=1.0, s_max=1.0, **rates)
     links = [("plant.x", "net.x"), ("plant.v", "net.v"), ("net.u", "plant.u")]
     ports = ["plant.x", "net.s", "net.nodes", "net.r", "net.f"]
     return simulate(System({"plant": Oscillators(), "net": net}, links), step=0.005, stop=100.0, record=ports)

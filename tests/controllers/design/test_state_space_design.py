@@ -5,14 +5,15 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from controllers.design.condensation import StateSpace, dominant_modes, first_order, static_condensation
+from controllers.design.reduction import dominant_modes, static_condensation
 from controllers.design.riccati import DesignError, regulator
-from controllers.design.surface_design import sliding_surface
+from controllers.design.state_space import StateSpace, first_order
+from controllers.design.surface_design import optimal_surface
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
 from controllers.laws.equivalent_force import design as equivalent_force
 from controllers.laws.sliding_mode import SlidingMode
 from controllers.laws.state_feedback import StateFeedback, weight_outputs
-from controllers.observers.observer import Observer, observer_gain
+from controllers.observers.observer import Observer, discretise, observer_gain
 from cosim import Array
 
 
@@ -109,7 +110,8 @@ def run_observer(shift: int) -> float:
     """Largest error in 100 steps of a plant that is the model; the observer gets u_{k-1+shift}."""
     model, h, steps = reduced(), 0.01, 100
     L = observer_gain(model, np.eye(6), 1e-3 * np.eye(2))
-    observer = Observer.from_gain(model, L, h)
+    A_o, B_o, L_o = discretise(model, L, h)
+    observer = Observer(A_d=A_o, B_d=B_o, L_d=L_o, sample_period=h)
     exponent = la.expm(np.block([[model.A * h, model.B * h], [np.zeros((1, 7))]]))
     A_d, B_d = exponent[:6, :6], exponent[:6, 6:]
     u = np.where(np.arange(steps + 2) % 2, 1.0, -1.0) * np.linspace(1.0, 2.0, steps + 2)
@@ -139,7 +141,8 @@ def test_observer_converges_from_a_wrong_state() -> None:
     """Without disturbance, (2.8): the error decays at the slowest observer eigenvalue, here within 60 s."""
     model, h = reduced(), 0.01
     L = observer_gain(model, 100.0 * np.eye(6), 1e-3 * np.eye(2))
-    observer = Observer.from_gain(model, L, h)
+    A_o, B_o, L_o = discretise(model, L, h)
+    observer = Observer(A_d=A_o, B_d=B_o, L_d=L_o, sample_period=h)
     A_d = la.expm(model.A * h)
     x = np.array([0.1, 0.2, 0.3, 0.0, 0.0, 0.0])
     slowest = -la.eigvals(model.A - L @ model.C).real.max()
@@ -176,7 +179,7 @@ def test_sliding_surface_is_optimal(rng: np.random.Generator) -> None:
     A, B = rng.normal(size=(5, 5)), np.vstack([np.zeros((3, 2)), rng.normal(size=(2, 2)) + 2 * np.eye(2)])
     root = rng.normal(size=(5, 5))
     Q = root @ root.T + np.eye(5)
-    P = sliding_surface(A, B, Q)
+    P = optimal_surface(A, B, Q)
     np.testing.assert_allclose(P[:, 3:], np.eye(2), atol=1e-12)
 
     def cost(P_1: Array) -> float:
@@ -221,7 +224,7 @@ def test_output_weights(rng: np.random.Generator) -> None:
     x, u = rng.normal(size=4), rng.normal(size=2)
     z = C @ x + D @ u
     assert x @ Q @ x + 2 * x @ N @ u + u @ R @ u == pytest.approx(z @ W @ z, rel=1e-12)
-    assert StateFeedback.lqg(
+    assert StateFeedback.lqr(
         StateSpace(-np.eye(4), np.eye(4)[:, :2], C, C, D, D), Q, R + np.eye(2), N
     ).minus_K.shape == (2, 4)
 
@@ -235,7 +238,7 @@ def test_failing_conditions_name_the_culprit() -> None:
     with pytest.raises(DesignError, match="not symmetric"):
         regulator(A, np.eye(2), np.eye(2), np.array([[1.0, 0.2], [0.0, 1.0]]))
     with pytest.raises(DesignError, match=r"fewer than 2 independent ways.*actuator 2"):
-        sliding_surface(np.eye(3), np.array([[1.0, 0.0], [2.0, 0.0], [0.5, 0.0]]), np.eye(3))
+        optimal_surface(np.eye(3), np.array([[1.0, 0.0], [2.0, 0.0], [0.5, 0.0]]), np.eye(3))
     M, _C, K = chain()
     with pytest.raises(DesignError, match="must be distinct"):
         static_condensation(M, K, [1, 1])

@@ -11,7 +11,7 @@ import pytest
 from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.algorithm_2 import AlgorithmII
 from controllers.laws.constant_gain import ConstantGain
-from controllers.laws.sliding_surface import SlidingSurface
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from cosim import Input, LinearContinuous, Parameter, State, System, simulate
 from cosim.blocks import RecordSource, SensorDynamics, WhiteNoise, function_source
 from cosim.ground_motion.ground_motion import el_centro
@@ -35,7 +35,7 @@ class Oscillator(LinearContinuous):
 
 def run(law, coupling, disturbance=None, sensor=False):
     system = System(
-        {"plant": Oscillator(), "surface": SlidingSurface(), "law": law},
+        {"plant": Oscillator(), "surface": PhasePlaneSurface(), "law": law},
         [("plant.x1", "surface.x1"), ("plant.x2", "surface.x2"), ("law.u", "plant.u")],
     )
     if sensor:

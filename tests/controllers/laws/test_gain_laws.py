@@ -9,7 +9,7 @@ from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.algorithm_2 import AlgorithmII
 from controllers.laws.constant_gain import ConstantGain
 from controllers.laws.equivalent_control import EquivalentControlGain
-from controllers.laws.sliding_surface import SlidingSurface
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from controllers.laws.state_dependent import StateDependentGain
 from controllers.laws.switching import HysteresisControl, SaturationControl
 from tests.cosim.blocks.drive import assert_same_bits, trace
@@ -91,9 +91,9 @@ def test_start_and_zero_are_no_switches():
     assert M.tolist() == [100, 100, 100, 100, 100, 50, 50]
 
 
-def test_sliding_surface():
+def test_phase_plane_surface():
     """(4.1): s = x2 + a x1, a on the displacement."""
-    assert trace(SlidingSurface(a=3.0), np.array([[2.0, 5.0]]), 0.01, "s")[0, 0] == 11.0
+    assert trace(PhasePlaneSurface(a=3.0), np.array([[2.0, 5.0]]), 0.01, "s")[0, 0] == 11.0
 
 
 def test_saturation_as_printed_and_continuous():

@@ -11,7 +11,7 @@ import pytest
 
 from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.algorithm_2 import AlgorithmII
-from controllers.laws.sliding_surface import SlidingSurface
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from cosim import FMU, System, simulate
 from cosim.blocks import WhiteNoise
 from fmus.export import export
@@ -32,7 +32,7 @@ def blocks(law, rate):
     return {
         "noise": WhiteNoise(seed=3, sample_period=2 * STEP, unit="m/s^2"),
         "control": law(**rate),
-        "surface": SlidingSurface(**rate),
+        "surface": PhasePlaneSurface(**rate),
     }
 
 

@@ -12,18 +12,19 @@ import importlib
 import math
 import pkgutil
 from collections.abc import Callable
+from dataclasses import asdict
 from functools import lru_cache
 
 import numpy as np
 
 from controllers.adaptive.scwnn import SCWNN
-from controllers.design.condensation import StateSpace as Model
-from controllers.design.condensation import dominant_modes
+from controllers.design.reduction import dominant_modes
+from controllers.design.state_space import StateSpace as Model
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
 from controllers.laws.equivalent_force import EquivalentForce, StateSurface
 from controllers.laws.equivalent_force import design as equivalent_force
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from controllers.laws.sliding_mode import SlidingMode
-from controllers.laws.sliding_surface import SlidingSurface
 from controllers.laws.state_dependent import StateDependentGain
 from controllers.laws.state_feedback import StateFeedback
 from controllers.laws.switching import SaturationControl
@@ -50,8 +51,8 @@ from fmus.plants.tuned_mass_damper import TunedMassDamper
 from scenarios.highway_bridge.benchmark import benchmark_bridge
 from scenarios.tall_building.building import Damper, default_building, with_damper
 from tests.benchmark_data import BRIDGE
-from tests.fmus.plants.test_damped_tower import small_tower
-from tests.fmus.plants.test_nonlinear_structure import yielding_plant
+from tests.fmus.plants.chains import yielding_plant
+from tests.fmus.plants.towers import small_tower
 
 H = 0.01
 PACKAGES = ("controllers", "cosim.blocks", "fmus", "scenarios")
@@ -89,16 +90,16 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     # control laws of chapter 2, their filter, observer and estimator
     SlidingMode: [lambda: SlidingMode.design(model(), np.eye(4))],
     ContinuousSlidingMode: [lambda: ContinuousSlidingMode.design(model(), np.eye(4), 1.2)],
-    StateFeedback: [lambda: StateFeedback.lqg(model(), np.eye(4), np.array([[1e-9]]), every=2)],
+    StateFeedback: [lambda: StateFeedback.lqr(model(), np.eye(4), np.array([[1e-9]]), every=2)],
     Observer: [lambda: Observer.design(model(), np.eye(5), 1e-6 * np.eye(2), H)],
     StateSurface: [lambda: equivalent_force(model(), np.eye(4))[0]],
     EquivalentForce: [lambda: equivalent_force(model(), np.eye(4))[1]],
     # chapter 3
-    SCWNN: [lambda: SCWNN.of_size(2, 30)],
+    SCWNN: [lambda: SCWNN.design(2, 30)],
     KinematicObserver: [lambda: KinematicObserver(T=_random(2, 2))],
     ViscousDampers: [lambda: ViscousDampers(p=3)],
     # gain laws of chapter 4
-    SlidingSurface: [lambda: SlidingSurface(a=1.5)],
+    PhasePlaneSurface: [lambda: PhasePlaneSurface(a=1.5)],
     StateDependentGain: [lambda: StateDependentGain(n=3)],
     SaturationControl: [SaturationControl, lambda: SaturationControl(scaled=1.0, gamma=0.4)],
     # filters, sensors, actuators, converters, sources
@@ -127,12 +128,10 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     _FunctionOfTime: [lambda: function_source(lambda t: 25.0 * (math.sin(t) + 1.0))],
     WeightedSum: [lambda: WeightedSum([1.0, -0.3, 7.0])],
     # plants and their load
-    ShearBuilding: [
-        lambda: ShearBuilding.with_modal_damping([3.0, 2.0, 1.5], [3e3, 2e3, 1e3], [0.02, 0.03, 0.05])
-    ],
+    ShearBuilding: [lambda: ShearBuilding.build([3.0, 2.0, 1.5], [3e3, 2e3, 1e3], [0.02, 0.03, 0.05])],
     TunedMassDamper: [lambda: TunedMassDamper(m=50.0, c=20.0, k=500.0)],
-    ModalStructure: [lambda: ModalStructure.of(small_tower(), [2, 5])],
-    DampedTower: [lambda: DampedTower.of(small_tower(), [5], stiffness=1.15)],
+    ModalStructure: [lambda: ModalStructure.build(small_tower(), [2, 5])],
+    DampedTower: [lambda: DampedTower.build(small_tower(), [5], stiffness=1.15, **asdict(Damper()))],
     NonlinearStructure: [yielding_plant],
     FloorLoad: [lambda: FloorLoad(table=_random(60, 3), dt=0.025)],
 }
@@ -145,7 +144,7 @@ def makers(kind: type[Participant]) -> list[Callable[[], Participant]]:
 
 def whole_tower() -> Participant:
     """76 floors and the damper: 154 states."""
-    return DampedTower.of(default_building(), (1, 30, 50, 76))
+    return DampedTower.build(default_building(), (1, 30, 50, 76), **asdict(Damper()))
 
 
 def whole_bridge() -> Participant:

@@ -142,7 +142,7 @@ class Root(Continuous):
 
 def building() -> ShearBuilding:
     """Three stories, nothing equal, nothing symmetric, damping by mode."""
-    return ShearBuilding.with_modal_damping([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], [0.02, 0.03, 0.05])
+    return ShearBuilding.build([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], [0.02, 0.03, 0.05])
 
 
 PARTICIPANTS: dict[str, Callable[[], Block | Continuous]] = {

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,8 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
 from controllers.adaptive.scwnn import SCWNN
+from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from controllers.laws.sliding_mode import SlidingMode
-from controllers.laws.sliding_surface import SlidingSurface
 from controllers.laws.state_feedback import StateFeedback
 from controllers.laws.switching import SaturationControl
 from controllers.observers.kinematic_observer import KinematicObserver
@@ -43,9 +43,10 @@ from fmus.export import export
 from fmus.packaging.other_tools import ecospy
 from fmus.plants.damped_tower import DampedTower
 from fmus.plants.oscillator import Oscillator
+from scenarios.tall_building.building import Damper
 from tests.fmus.export.every_class import model
 from tests.fmus.export.host import building
-from tests.fmus.plants.test_damped_tower import small_tower
+from tests.fmus.plants.towers import small_tower
 from tests.others import tool
 
 
@@ -69,7 +70,7 @@ def tower(law: Callable[[], Participant], *, filtered: bool) -> Loop:
     def members() -> dict[str, Participant]:
         found: dict[str, Participant] = {
             "wind": WhiteNoise(sample_period=0.005, seed=4, sigma=[2e5, 4e5]),
-            "tower": DampedTower.of(small_tower(), [5]),
+            "tower": DampedTower.build(small_tower(), [5], **asdict(Damper())),
             "observer": Observer.design(model(), np.eye(5), 1e-14 * np.eye(2), 0.005),
             "law": law(),
         }
@@ -95,7 +96,7 @@ def network() -> Loop:
             "noise": WhiteNoise(sample_period=0.002, seed=4, sigma=20.0, n=2, unit="m/s^2"),
             "building": building(),
             "observer": KinematicObserver(T=[[1.0, 0.01], [0.02, 0.99]]),
-            "law": SCWNN.of_size(2, 30, k1=5.0, k2=1.0, g_min=2.0, s_max=2.0, u_max=100.0, d_max=0.001),
+            "law": SCWNN.design(2, 30, k1=5.0, k2=1.0, g_min=2.0, s_max=2.0, u_max=100.0, d_max=0.001),
         },
         [
             ("noise.y[1]", "building.ground_acceleration"),
@@ -115,7 +116,7 @@ def boundary_layer() -> Loop:
     return Loop(
         lambda: {
             "plant": Oscillator(),
-            "surface": SlidingSurface(),
+            "surface": PhasePlaneSurface(),
             "law": SaturationControl(scaled=1.0, gamma=20.0),
         },
         [
@@ -132,7 +133,7 @@ def boundary_layer() -> Loop:
 
 LOOPS: dict[str, Callable[[], Loop]] = {
     "filtered SMC": lambda: tower(lambda: SlidingMode.design(model(), np.eye(4)), filtered=True),
-    "LQG": lambda: tower(lambda: StateFeedback.lqg(model(), np.eye(4), np.array([[1e-12]])), filtered=False),
+    "LQG": lambda: tower(lambda: StateFeedback.lqr(model(), np.eye(4), np.array([[1e-12]])), filtered=False),
     "wavelet network": network,
     "boundary layer": boundary_layer,
 }

@@ -187,7 +187,7 @@ def test_interpreted_compiled_and_as_fmu_it_is_the_same_plant(fmu_of: Callable[.
 
 def test_a_building_of_many_stories_has_all_its_ports(tmp_path: Path) -> None:
     n = 24
-    plant = type(building()).with_modal_damping(np.full(n, 2.0), np.full(n, 900.0), 0.02)
+    plant = type(building()).build(np.full(n, 2.0), np.full(n, 900.0), 0.02)
     path = export(plant, tmp_path / "tall.fmu")
     assert validate_fmu(str(path)) == []
     description = read_model_description(str(path))

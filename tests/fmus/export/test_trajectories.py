@@ -288,7 +288,7 @@ def test_directional_derivative_by_a_parameter_while_initialising(host_of: Calla
 
 def test_rayleigh_damping_has_its_ratio_at_two_modes() -> None:
     m, k = np.array([3.0, 2.0, 1.5]), np.array([3000.0, 2000.0, 1000.0])
-    plant = ShearBuilding.with_rayleigh_damping(m, k, 0.05, modes=(1, 3))
+    plant = ShearBuilding.build(m, k, 0.05, rayleigh=(1, 3))
     squares, modes = eigh(stiffness_matrix(k), np.diag(m))
     ratios = np.diag(modes.T @ plant.C @ modes) / (2.0 * np.sqrt(squares))
     assert ratios[[0, 2]] == pytest.approx(0.05, rel=1e-12)

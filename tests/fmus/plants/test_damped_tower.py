@@ -1,30 +1,23 @@
 """The tower with damper: its modes and its step against scipy.linalg.expm, and energy."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import scipy.linalg as la
 
-from controllers.design.condensation import first_order
+from controllers.design.state_space import first_order
 from cosim import Array, System, simulate
 from fmus.export import as_fmu
 from fmus.kernels.coupled_modes import coupled_modes
 from fmus.loads.wind import FloorLoad
 from fmus.plants.damped_tower import DampedTower
 from fmus.plants.modal_structure import ModalStructure
-from scenarios.tall_building.building import Damper, Structure, default_building, modes_of, with_damper
+from fmus.structures.structure import Structure, modes_of
+from scenarios.tall_building.building import Damper, default_building, with_damper
+from tests.fmus.plants.towers import small_tower
 
 FLOORS = (1, 30, 50, 76)
-
-
-def small_tower() -> Structure:
-    """Five floors, classically damped, two modes overdamped."""
-    M = np.diag([3.0, 2.5, 2.0, 2.0, 1.5]) * 1e6
-    k = np.array([9.0, 8.0, 6.0, 5.0, 4.0]) * 1e8
-    K = np.diag(k) + np.diag(np.append(k[1:], 0.0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
-    omega2, shapes = la.eigh(K, M)
-    zeta = np.array([0.01, 0.05, 0.6, 1.3, 2.0])
-    left = M @ shapes
-    return Structure(M, (left * (2 * zeta * np.sqrt(omega2))) @ left.T, K)
 
 
 def held_step(coupled: Structure, h: float) -> tuple[Array, Array]:
@@ -90,7 +83,7 @@ def test_step_is_the_matrix_exponential(make, plant: str) -> None:  # type: igno
     floors = [1, n // 2, n]
     rng = np.random.default_rng(1)
     table = 1e5 * rng.normal(size=(steps + 1, n + 1))
-    tower = DampedTower.of(structure, floors, stiffness=stiffness)
+    tower = DampedTower.build(structure, floors, stiffness=stiffness, **asdict(Damper()))
     system = System(
         {"load": FloorLoad(table=table[:, :n], dt=h), "force": FloorLoad(table=table[:, n:], dt=h)}
     )
@@ -123,8 +116,8 @@ def test_step_is_the_matrix_exponential(make, plant: str) -> None:  # type: igno
 def test_parameters_are_settable_in_the_fmu() -> None:
     """Stiffness and damper constants set on the FMU give the plant made with them: same kernel, same bits."""
     structure = small_tower()
-    made = DampedTower.of(structure, [5], Damper(m=3e5, c=1e5, k=4e5), stiffness=1.15)
-    fmu = as_fmu(DampedTower.of(structure, [5]))
+    made = DampedTower.build(structure, [5], m=3e5, c=1e5, k=4e5, stiffness=1.15)
+    fmu = as_fmu(DampedTower.build(structure, [5], m=5e5, c=2e5, k=5e5))
     fmu.start.update({"stiffness": 1.15, "m": 3e5, "c": 1e5, "k": 4e5})
     results = []
     for plant in (made, fmu):
@@ -144,7 +137,7 @@ def test_real_modes_are_the_matrix_exponential() -> None:
     rng = np.random.default_rng(2)
     table = 1e5 * rng.normal(size=(101, n))
     system = System(
-        {"load": FloorLoad(table=table, dt=h), "tower": ModalStructure.of(structure, [2, 5], stiffness)},
+        {"load": FloorLoad(table=table, dt=h), "tower": ModalStructure.build(structure, [2, 5], stiffness)},
         [("load.w", "tower.w")],
     )
     result = simulate(system, step=h, stop=100 * h, record=["tower.x", "tower.a"])
@@ -171,7 +164,7 @@ def test_energy_balance_of_an_uncontrolled_run_closes() -> None:
         [np.interp(np.arange(steps + 1) * h, np.arange(12) * 2.0, coarse[:, j]) for j in range(76)]
     ).T
     system = System(
-        {"load": FloorLoad(table=table, dt=h), "tower": ModalStructure.of(structure, range(1, 77))},
+        {"load": FloorLoad(table=table, dt=h), "tower": ModalStructure.build(structure, range(1, 77))},
         [("load.w", "tower.w")],
     )
     result = simulate(system, step=h, stop=steps * h, record=["tower.x", "tower.v"])

@@ -7,50 +7,13 @@ import pytest
 import scipy.linalg as la
 from scipy.integrate import solve_ivp
 
-from cosim import Block, Output, Parameter, SimulationError, State, System, simulate
-from fmus.plants import nonlinear_structure as ns
+from cosim import SimulationError, System, simulate
+from cosim.codegen.kernels import lower
+from fmus.elements.bilinear import bilinear
+from fmus.elements.element import Element
 from fmus.plants.nonlinear_structure import NonlinearStructure
-
-
-class Held(Block):
-    """Rows of a table, one a communication step."""
-
-    table = Parameter(shape=("n", "m"), fixed=True)
-    k = State()
-    y = Output(shape="m", unit="m/s2")
-
-    def step(self, t: float, h: float) -> None:
-        for j in range(self.y.shape[0]):
-            self.y[j] = self.table[int(self.k), j]
-        self.k += 1.0
-
-
-def shaken(structure, ground, step, record=("plant.y",), jit=True):
-    """Run under a ground acceleration given by step, (n, 1). Small ones run interpreted: no compilation."""
-    system = System({"plant": structure, "quake": Held(table=ground)}, [("quake.y", "plant.ground")])
-    return simulate(system, step=step, stop=(len(ground) - 1) * step, record=list(record), jit=jit)
-
-
-def chain(n=5, m=2.0, k=900.0, c=1.5):
-    """A fixed chain of unequal masses, springs and dashpots."""
-    M = m * np.linspace(1.0, 2.0, n)
-    K = np.zeros((n, n))
-    for i in range(n):
-        ki = k * (1.0 + 0.3 * i)
-        K[i, i] += ki
-        if i:
-            K[i - 1, i - 1] += ki
-            K[i, i - 1] -= ki
-            K[i - 1, i] -= ki
-    return M, c / k * K + 0.1 * np.diag(M), K
-
-
-def drift(n, i):
-    row = np.zeros(n)
-    row[i] = 1.0
-    if i:
-        row[i - 1] = -1.0
-    return row
+from fmus.structures.structure import Structure, StructureError
+from tests.fmus.plants.chains import Held, chain, drift, shaken, yielding_plant
 
 
 def smooth(n, h):
@@ -68,38 +31,18 @@ def test_linear_structure_is_newmark_one_quarter_one_half():
     """Against the textbook recursion with dense matrices: the same method, so to rounding (1e-10)."""
     n, h = 5, 0.02
     M, C, K = chain(n)
-    elements = [ns.bilinear(drift(n, 2), 900.0 * 1.6, 1.0, 1e9)]  # in K, and never yields
-    plant = NonlinearStructure.build(M, C, K, np.ones((n, 1)), elements, displacements=np.eye(n))
+    elements = [bilinear(drift(n, 2), 900.0 * 1.6, 1.0, 1e9)]  # in K, and never yields
+    plant = NonlinearStructure.build(Structure(M, C, K, np.ones(n), displacements=np.eye(n)), elements)
     ag = smooth(80, h)
     x, v, got = np.zeros(n), np.zeros(n), [np.zeros(n)]
-    K_eff = 4 / h**2 * np.diag(M) + 2 / h * C + K
+    K_eff = 4 / h**2 * M + 2 / h * C + K
     for a in ag[:-1, 0]:
-        p = -M * a
-        dx = la.solve(K_eff, 2 * p + 4 / h * M * v - 2 * K @ x)
+        p = -np.diag(M) * a
+        dx = la.solve(K_eff, 2 * p + 4 / h * M @ v - 2 * K @ x)
         x, v = x + dx, 2 / h * dx - v
         got.append(x)
     y = shaken(plant, ag, h, jit=False)["plant.y"]
     assert np.abs(y - np.array(got)).max() < 1e-10 * np.abs(y).max()
-
-
-def yielding_plant(bisections=6, **values):
-    n = 3
-    M, C, K = chain(n)
-    elements = [
-        ns.bilinear(drift(n, 0), 900.0, 60.0, 0.01),
-        ns.bouc_wen(drift(n, 2), 400.0, 0.1, 0.008),
-        ns.viscous_damper(drift(n, 1), 6.0, 0.6, 0.02),
-        ns.gap(drift(n, 1), 3000.0, 0.012),
-        ns.friction_damper(drift(n, 2), 500.0, 1.5),
-    ]
-    for e in elements:
-        if e.kind == 1:
-            continue  # the chain's own spring is the bilinear one
-        K = K + e.k0 * e.rows.T @ e.rows
-    return NonlinearStructure.build(
-        M, C, K, np.ones((n, 1)), elements,
-        displacements=np.eye(n), accelerations=np.eye(n), bisections=bisections, **values,
-    )  # fmt: skip
 
 
 def reference(t_end, times):
@@ -120,7 +63,7 @@ def reference(t_end, times):
         speed = abs(rate[1])
         forces[1] += rate[1] * 6.0 * 0.02**-0.4 if speed <= 0.02 else np.sign(rate[1]) * 6.0 * speed**0.6
         forces[1] += 3000.0 * max(d[1] - 0.012, 0.0)
-        a = (-M * smooth_at(t) - C @ v - K @ x - B.T @ forces) / M
+        a = -smooth_at(t) - la.solve(M, C @ v + K @ x + B.T @ forces)
         return np.concatenate([v, a, [dq, dz, dg]])
 
     s = solve_ivp(f, (0, t_end), np.zeros(9), t_eval=times, rtol=1e-8, atol=1e-10, max_step=1e-3)
@@ -160,10 +103,8 @@ def test_bilinear_oscillator_from_rest_at_constant_force():
     """Suddenly applied force F on a bilinear oscillator without damping: by energy, the peak solves
     F x = 1/2 k1 dy^2 + k1 dy (x - dy) + 1/2 k2 (x - dy)^2. Newmark with w h = 0.02 and less: 1e-4."""
     m, k1, k2, dy, F = 3.0, 1200.0, 100.0, 0.02, 16.0
-    plant = NonlinearStructure.build(
-        np.array([m]), np.zeros((1, 1)), np.array([[k1]]), np.ones((1, 1)),
-        [ns.bilinear(np.ones(1), k1, k2, dy)], displacements=np.ones((1, 1)),
-    )  # fmt: skip
+    structure = Structure([[m]], [[0.0]], [[k1]], np.ones(1), displacements=np.ones(1))
+    plant = NonlinearStructure.build(structure, [bilinear(np.ones(1), k1, k2, dy)])
     h = 1e-3
     y = shaken(plant, np.full((1600, 1), -F / m), h, jit=False)["plant.y"]
     # 1/2 k2 x^2 + ((k1 - k2) dy - F) x - 1/2 (k1 - k2) dy^2 = 0
@@ -179,10 +120,10 @@ def cubic(e, d, d0, rate, h, p, z0, z):
 
 def test_a_law_of_ones_own():
     """Duffing oscillator against an adaptive solver; h = 2 ms leaves (w h)^2/12 = 2e-4 in phase a radian."""
+    structure = Structure([[2.0]], [[0.8]], [[300.0]], np.ones(1), displacements=np.ones(1))
     plant = NonlinearStructure.build(
-        np.array([2.0]), np.array([[0.8]]), np.array([[300.0]]), np.ones((1, 1)),
-        [ns.own(np.ones(1), (300.0, 4e4), 300.0, 0.05)], displacements=np.ones((1, 1)), law=cubic,
-    )  # fmt: skip
+        structure, [Element(cubic, np.ones(1), (300.0, 4e4), k0=300.0, scale=0.05)]
+    )
     h = 2e-3
     y = shaken(plant, smooth(1001, h), h, jit=False)["plant.y"].ravel()
     t = np.arange(1001) * h
@@ -214,3 +155,34 @@ def test_interpreted_and_compiled_agree():
         )
         runs.append(simulate(system, step=0.01, stop=0.5, record=["plant.y"], jit=jit)["plant.y"])
     assert np.abs(runs[0] - runs[1]).max() < 1e-9 * np.abs(runs[0]).max()
+
+
+def test_a_stiffness_without_the_elements_initial_tangent_is_refused():
+    """The chain's base spring is the element: K without it lets the chain float, K with it does not."""
+    n = 3
+    M, C, K = chain(n)
+    element = bilinear(drift(n, 0), 900.0, 60.0, 0.01)
+    floating = Structure(M, C, K - 900.0 * element.rows.T @ element.rows, np.ones(n))
+    with pytest.raises(StructureError, match="K does not contain them; add "):
+        NonlinearStructure.build(floating, [element])
+    assert NonlinearStructure.build(Structure(M, C, K, np.ones(n)), [element]).k0.tolist() == [900.0]
+
+
+def test_a_structure_needs_lumped_masses_and_elements_that_fit():
+    M, C, K = chain(3)
+    M[0, 1] = M[1, 0] = 0.5
+    with pytest.raises(StructureError, match="M is not diagonal"):
+        NonlinearStructure.build(Structure(M, C, K))
+    with pytest.raises(StructureError, match="element 0 has rows of 2 entries, the structure has 3"):
+        NonlinearStructure.build(Structure(np.diag(np.diag(M)), C, K), [bilinear(np.ones(2), 2.0, 1.0, 1.0)])
+
+
+def test_only_the_laws_in_use_are_compiled():
+    """The powers of the Bouc-Wen and viscous laws need a power function; bilinear elements do not."""
+    M, C, K = chain(2)
+    structure = Structure(M, C, K, np.ones(2))
+    elements = [bilinear(drift(2, 0), 900.0, 60.0, 0.01), bilinear(drift(2, 1), 900.0, 60.0, 0.01)]
+    plant = NonlinearStructure.build(structure, elements)
+    assert "llvm.pow" not in lower(plant)
+    assert "llvm.pow" in lower(yielding_plant())
+    assert type(plant) is type(NonlinearStructure.build(structure, elements[:1]))  # compiled once

@@ -5,15 +5,18 @@ Where openseespy cannot be imported, the module is skipped with the reason.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cosim import System, simulate
-from fmus.elements import hysteresis as law
+from fmus.elements.bilinear import bilinear
+from fmus.elements.bouc_wen import bouc_wen
 from fmus.packaging.other_tools import opensees
-from fmus.plants.nonlinear_structure import NonlinearStructure, bilinear
+from fmus.plants.nonlinear_structure import NonlinearStructure
 from fmus.structures.opensees import opensees_model
-from tests.fmus.elements.test_hysteresis import drive
-from tests.fmus.plants.test_nonlinear_structure import Held
+from tests.fmus.elements.paths import drive
+from tests.fmus.plants.chains import Held
 from tests.others import tool
 
 ops = tool(opensees)
@@ -36,7 +39,7 @@ def material(kind, arguments):
 def test_bilinear_is_steel01():
     """Both are exact on a given path: to rounding (1e-10)."""
     k1, k2, dy = 4.8e6, 6.0e5, 0.015
-    ours = drive(law.bilinear, (k1, k2, dy), PATH)[:, 0]
+    ours = drive(bilinear(np.ones(1), k1, k2, dy), PATH)[:, 0]
     assert np.abs(ours - material("Steel01", (k1 * dy, k1, k2 / k1))).max() < 1e-10 * np.abs(ours).max()
 
 
@@ -44,7 +47,7 @@ def test_bouc_wen_is_boucwen():
     """OpenSees integrates z by backward Euler, we by the midpoint rule: first order apart, with
     steps up to 4 % of dy; 2 % of the largest force."""
     k1, alpha, dy, n, beta, gamma = 4.8e6, 0.1, 0.015, 1.5, 0.6, 0.4
-    ours = drive(law.bouc_wen, (k1, alpha, dy, n, beta, gamma), PATH)[:, 0]
+    ours = drive(bouc_wen(np.ones(1), k1, alpha, dy, n, beta, gamma), PATH)[:, 0]
     theirs = material(
         "BoucWen", (alpha, k1, n, gamma / dy**n, beta / dy**n, 1.0, 0.0, 0.0, 0.0)
     )  # z there is a deformation
@@ -79,11 +82,9 @@ def test_frame_of_opensees_moves_as_in_opensees():
     ground = 3.0 * np.sin(9.0 * t) * np.minimum(t, 1.0)
     portal(yielding=False)
     model = opensees_model(ops)
-    plant = NonlinearStructure.build(
-        model.M, model.C, model.K, model.influence((1,)),
-        [bilinear(model.row({(3, 1): 1.0}), 3e4, 3e3, 0.01)],
-        displacements=model.row({(3, 1): 1.0}), event_tolerance=1e9,
-    )  # fmt: skip
+    tip = model.freedoms.row({(3, 1): 1.0})
+    structure = replace(model, influence=model.freedoms.rigid_motion((1,)), displacements=tip)
+    plant = NonlinearStructure.build(structure, [bilinear(tip, 3e4, 3e3, 0.01)], event_tolerance=1e9)
     means = 0.5 * (ground[:-1] + ground[1:])[:, None]
     system = System({"plant": plant, "quake": Held(table=means)}, [("quake.y", "plant.ground")])
     ours = simulate(system, step=h, stop=(n - 1) * h, record=["plant.y"], jit=False)["plant.y"].ravel()

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+from fmus.structures.structure import Structure, StructureError, modes_of
 from scenarios.tall_building.building import (
     STORY_HEIGHTS,
     Damper,
-    Structure,
-    StructureError,
     cantilever_stiffness,
     default_building,
     load_building,
-    modes_of,
     with_damper,
 )
 from tests.benchmark_data import TOWER, needs_data

@@ -8,7 +8,7 @@ On s = 0 the state decays: x1' = -a x1, so x1 = e^(-a t) x1(0).
 from cosim import Block, Input, Output, Parameter
 
 
-class SlidingSurface(Block):
+class PhasePlaneSurface(Block):
     """s = x2 + a x1, of displacement x1 and velocity x2 at the same instant."""
 
     a = Parameter(1.0, "rate of decay on the surface", unit="1/s", min=0.0)
