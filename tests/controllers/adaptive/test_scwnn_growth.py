@@ -13,7 +13,7 @@ FAR = 1.0  # of a new input from the nearest node, far above the distance that m
 def grown(x: float) -> SCWNN:
     """Hold |e| = x for six samples, the sixth at a new place, where the nearest node is FAR away."""
     # centres and widths stay where they are, and no node is dropped
-    network = SCWNN.of_size(1, 10, d_max=E2, d_min=E2, eta_c=0.0, eta_sigma=0.0, E3=0.0)
+    network = SCWNN.design(1, 10, d_max=E2, d_min=E2, eta_c=0.0, eta_sigma=0.0, E3=0.0)
     for k in range(6):
         network.x[0], network.v[0] = x, FAR if k == 5 else 0.0
         network.step(0.0, 0.005)

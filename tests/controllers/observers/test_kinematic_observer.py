@@ -17,7 +17,7 @@ def test_poles_are_those_of_the_steady_kalman_filter(alpha: float) -> None:
 
     Two unknowns from 30 equations without noise: least squares leave roundings.
     """
-    filter_ = KinematicObserver.of_rigid_parts(np.eye(1), np.eye(1), alpha)
+    filter_ = KinematicObserver.design(np.eye(1), np.eye(1), alpha)
     y = np.zeros((32, 1))
     y[0] = 1.0
     x = trace(filter_, y, H, "x")[:, 0]
@@ -29,7 +29,7 @@ def test_poles_are_those_of_the_steady_kalman_filter(alpha: float) -> None:
 
 def test_a_steady_motion_is_followed_without_error() -> None:
     """y = 3 t: displacement and velocity are exact once the start has decayed (poles of 0.71, 200 steps)."""
-    filter_ = KinematicObserver.of_rigid_parts(np.eye(1), np.eye(1))
+    filter_ = KinematicObserver.design(np.eye(1), np.eye(1))
     y = 3.0 * H * np.arange(200.0)[:, None]
     assert trace(filter_, y, H, "x")[-1] == pytest.approx(y[-1], rel=1e-9)
     assert trace(filter_, y, H, "v")[-1] == pytest.approx([3.0], rel=1e-9)

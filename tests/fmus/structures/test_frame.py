@@ -17,9 +17,9 @@ PAIRS = [(axis, direction) for axis in AXES for direction in AXES if axis != dir
 
 def deflected(frame: Frame, node: str, direction: str) -> dict[str, float]:
     """Return the motion of a node under a force P on it, by freedom."""
-    force = P * frame.row({(node, f"u{direction}"): 1.0})
+    force = P * frame.freedoms.row({(node, f"u{direction}"): 1.0})
     motion = np.linalg.solve(frame.matrices()[1], force)
-    return {f: float(motion[i]) for (n, f), i in frame.index.items() if n == node}
+    return {f: float(motion[i]) for (n, f), i in frame.freedoms.items() if n == node}
 
 
 @pytest.mark.parametrize(("axis", "direction"), PAIRS)
@@ -78,4 +78,4 @@ def test_a_turned_member_is_free_of_force() -> None:
             moved = dict(zip(AXES, np.cross(rotation, L), strict=True))
             weights = {(node, f"r{AXES[i]}"): 1.0 for node in "01"}
             weights |= {("1", f"u{d}"): float(x) for d, x in moved.items()}
-            assert np.abs(K @ frame.row(weights)).max() < 1e-9 * np.abs(K).max()
+            assert np.abs(K @ frame.freedoms.row(weights)).max() < 1e-9 * np.abs(K).max()
