@@ -1,4 +1,4 @@
-"""Systems as files: SSP 1.0 and 2.0 in; fmus/ssp.py writes them."""
+"""Reads systems from SSP files, version 1.0 and 2.0; fmus/packaging/ssp.py writes them."""
 
 from .reader import read_package, read_ssp
 

@@ -1,7 +1,8 @@
-"""What the reader and the writer of SSP share: namespaces, our annotations, units, XML.
+"""The parts of SSP that the reader and the writer share: namespaces, annotations, units, XML.
 
-SSP does not say when a component acts, nor with which step a system is run. That is in
-annotations of our own, which other tools skip (SSP 1.0, 4.2: unknown types are ignored):
+SSP has no attribute for the instants at which a component acts, or for the step of a run.
+structcosim keeps them in annotations, which other tools skip (SSP 1.0, 4.2: unknown types are
+ignored):
 
     on a component     <participant kind="block" every="2" samplePeriod="0.01"/>
                        <participant solver="cvode" tolerance="1e-8" substeps="4" eventMode="true"
@@ -38,7 +39,7 @@ ANNOTATION = "structcosim"
 VERSIONS = ("1.0", "2.0")
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 ROOT = "SystemStructure.ssd"
-#: element of SSP 1.0 for a type of FMI; SSP 2.0 has those of FMI 3.0 by their own names
+#: elements of SSP 1.0 by type of FMI; SSP 2.0 has an element of the same name for each type of FMI 3.0
 TYPES_1 = {
     "Real": "Real",
     "Float64": "Real",
@@ -54,7 +55,7 @@ Unit: TypeAlias = tuple[str | None, Definition | None]
 
 
 class SSPError(CosimError):
-    """An SSP that cannot be read or written: where, what is in it, and what is supported."""
+    """An SSP that cannot be read or written; the text says where and what is supported."""
 
 
 def tag(prefix: str, name: str) -> str:
@@ -63,39 +64,39 @@ def tag(prefix: str, name: str) -> str:
 
 
 def parse_xml(text: bytes, where: str) -> etree._Element:
-    """Parse XML from another hand: entities are not expanded, nothing else is loaded."""
+    """Parse XML that may be hostile: entities are not expanded, no other file is loaded."""
     parser = etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, remove_pis=True
     )
     try:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
-        raise SSPError(f"{where} is broken XML: {error}") from None
+        raise SSPError(f"{where} is not valid XML: {error}") from None
     if root.getroottree().docinfo.internalDTD is not None:
         raise SSPError(f"{where} has a document type declaration (DTD), which SSP does not use; remove it")
     return root
 
 
 def own_annotation(element: etree._Element, prefix: str, name: str) -> Mapping[str, str]:
-    """Return the attributes of our annotation `name` of an element, none if it has none."""
+    """Return the attributes of structcosim's annotation `name` of an element, {} without one."""
     place = f"{prefix}:Annotations/{SSC}:Annotation[@type='{ANNOTATION}']/{OWN}:{name}"
     found = element.find(place, NAMESPACES)
     return {} if found is None else {str(k): str(v) for k, v in found.attrib.items()}
 
 
 def numbers(text: str, where: str) -> list[float]:
-    """Return a list of numbers as XML Schema writes it."""
+    """Return the numbers of a text in the notation of XML Schema."""
     try:
         return [float(_INFINITE.get(part, part)) for part in text.split()]
     except ValueError:
-        raise SSPError(f"{where}: '{text}' is no list of numbers") from None
+        raise SSPError(f"{where}: '{text}' must be numbers, separated by spaces") from None
 
 
 def number(text: str, where: str) -> float:
     """Return one number."""
     found = numbers(text, where)
     if len(found) != 1:
-        raise SSPError(f"{where}: '{text}' is not one number")
+        raise SSPError(f"{where}: '{text}' must be one number")
     return found[0]
 
 
@@ -108,19 +109,19 @@ _INFINITE = {"INF": "inf", "-INF": "-inf"}
 
 
 def flag(text: str | None) -> bool:
-    """Return an xs:boolean; false by default."""
+    """Return the value of an xs:boolean attribute; false where it is absent."""
     return text in ("true", "1")
 
 
 @dataclass
 class Units:
-    """The units that a file defines, and conversions; names that it does not define are known to pint."""
+    """The units that a file defines; pint knows the other names."""
 
     definitions: dict[str, Definition] = field(default_factory=dict)
 
     @classmethod
     def of(cls, parent: etree._Element, prefix: str, where: str) -> Units:
-        """Read the `Units` of a file."""
+        """Read the `Units` element of a file."""
         found = cls()
         for unit in parent.iterfind(f"{prefix}:Units/{SSC}:Unit", NAMESPACES):
             base = unit.find(f"{SSC}:BaseUnit", NAMESPACES)
@@ -129,17 +130,20 @@ class Units:
                 exponents = [number(base.get(n, "0"), place) for n in BASE_UNITS]
                 factor, offset = factor_and_offset(base, place)
                 if not all(map(math.isfinite, (*exponents, 1.0 / factor if factor else math.inf, offset))):
-                    raise SSPError(f"{place}: its exponents, factor {factor} and offset {offset} are no unit")
+                    raise SSPError(
+                        f"{place}: exponents, factor {factor} and offset {offset} must be finite, and the "
+                        "factor must not be 0"
+                    )
                 defined = Definition(tuple(map(int, exponents)), factor, offset)
                 found.definitions[unit.get("name", "")] = defined
         return found
 
     def add_fmu(self, description: Any) -> None:
-        """Add the units that an FMU defines; a definition that is there already stays."""
+        """Add the units that an FMU defines; an earlier definition of the same name is kept."""
         self.definitions = unit_definitions(description) | self.definitions
 
     def attributes(self, name: str) -> dict[str, str]:
-        """Return the attributes of a unit's BaseUnit, in SSP as in FMI."""
+        """Return the attributes of a unit's BaseUnit, which are those of FMI."""
         unit = self.definitions[name]
         found = {n: str(e) for n, e in zip(BASE_UNITS, unit.exponents, strict=True) if e}
         found |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
@@ -151,6 +155,6 @@ class Units:
 
 
 def element_name(path: tuple[str, ...]) -> str:
-    """Return the participant's name for an element of nested systems: dots and the like are underscores."""
+    """Return the participant's name for an element of nested systems; other characters become underscores."""
     name = re.sub(r"\W", "_", "_".join(path))
     return name if re.match(r"[A-Za-z_]", name) else f"_{name}"

@@ -1,9 +1,9 @@
-"""Parameter values of an SSP (SSV, SSM): which value a connector or variable starts with.
+"""Parameter values of an SSP (SSV, SSM): the start values of connectors and variables.
 
-Bindings of a component name its variables, bindings of a system those of its elements by
-`element.variable`, or its own connectors. A later binding wins over an earlier one, that of a
-system over that of its elements. Values for names that are not there are ignored, as the
-standard has it (SSP 2.0, 5.2.3), so that one set may serve many systems.
+A binding of a component names its variables; a binding of a system names the variables of its
+elements, `element.variable`, or its own connectors. A later binding overrides an earlier one, and
+a binding of a system overrides those of its elements. Values for unknown names are ignored, as
+the standard requires (SSP 2.0, 5.2.3), so that one set may serve many systems.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _INTEGERS = {"Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (
 
 @dataclass(frozen=True)
 class Value:
-    """A parameter value in the unit that its file gives; `kind` is the type there."""
+    """A parameter value in the unit that its file gives; `kind` is its type in the file."""
 
     kind: str
     value: Any
@@ -50,7 +50,7 @@ class Value:
     keep_unit: bool = False
 
     def in_unit(self, unit: Unit, units: Units) -> Any:
-        """Return the value in a variable's unit, with the transformations on the way."""
+        """Return the value in a variable's unit, after the transformation of the mapping."""
         if self.kind not in _REALS:
             return self.value
         known = units.definitions | self.units.definitions
@@ -62,7 +62,7 @@ class Value:
 
 
 class Parameters:
-    """The start values that the bindings of all elements give, by connector or variable."""
+    """The start values that the bindings of all elements give, by connector or variable name."""
 
     def __init__(self, root: Element, read: Callable[[str, str], bytes], where: str) -> None:
         self.read = read
@@ -86,7 +86,7 @@ class Parameters:
         where = f"{self.where}: parameter binding of {'.'.join(element.path) or 'the root system'}"
         values = self._document(binding, "ParameterValues", SSV, "ParameterSet", where)
         if values is None:
-            raise SSPError(f"{where} has neither a source nor values")
+            raise SSPError(f"{where} has neither a source nor values; give one of them")
         units = Units.of(values, SSV, where)
         prefix = binding.get("prefix", "")
         given = {
@@ -106,24 +106,24 @@ class Parameters:
     def _document(
         self, element: etree._Element, inside: str | None, prefix: str, name: str, where: str
     ) -> etree._Element | None:
-        """Return a parameter set or mapping: a file of the package, or in place."""
+        """Return a parameter set or mapping, from a file of the package or in place."""
         source = element.get("source")
         kind = element.get("type", "application/x-ssp-parameter-")
         if not kind.startswith("application/x-ssp-parameter-"):
-            raise SSPError(f"{where}: type '{kind}' is not supported, SSV and SSM are")
+            raise SSPError(f"{where}: type '{kind}' is not supported; use SSV and SSM")
         if element.get("sourceBase", "SSD") != "SSD":
-            raise SSPError(f"{where}: sourceBase '{element.get('sourceBase')}' is not supported, SSD is")
+            raise SSPError(f"{where}: sourceBase '{element.get('sourceBase')}' is not supported; use SSD")
         if source:
             found = parse_xml(self.read(source, where), f"{self.where}/{source}")
             if found.tag != tag(prefix, name):
-                raise SSPError(f"{where}: {source} is no {name}")
+                raise SSPError(f"{where}: the root element of {source} must be a {name}")
             return found
         outer = element if inside is None else element.find(f"{SSD}:{inside}", NAMESPACES)
         return None if outer is None else outer.find(f"{prefix}:{name}", NAMESPACES)
 
 
 def _nodes(element: Element, name: str) -> Iterator[Node]:
-    """Yield what a name in a binding of an element means: variables below it, or a connector."""
+    """Yield the nodes that a name in a binding stands for: variables below the element, or a connector."""
     if element.is_component:
         yield Node(element.path, name)
         return
@@ -136,10 +136,10 @@ def _nodes(element: Element, name: str) -> Iterator[Node]:
 
 
 def _value(parameter: etree._Element, units: Units, where: str) -> Value:
-    """Read one parameter of a set; several values are those of an array, row by row."""
+    """Read one parameter of a set; several values are an array, row by row."""
     found = next((c for c in parameter if c.tag.startswith(f"{{{NAMESPACES[SSV]}}}")), None)
     if found is None:
-        raise SSPError(f"{where} has no value")
+        raise SSPError(f"{where} has no value; give an element such as <ssv:Real value=...>")
     kind = str(found.tag).rpartition("}")[2]
     each = [str(v.get("value")) for v in found.iterfind(f"{SSV}:Value", NAMESPACES)]
     text = str(found.get("value", ""))
@@ -150,7 +150,7 @@ def _value(parameter: etree._Element, units: Units, where: str) -> Value:
         try:
             values = [int(part) for part in text.split()]
         except ValueError:
-            raise SSPError(f"{where}: '{text}' is no whole number") from None
+            raise SSPError(f"{where}: '{text}' must be a whole number") from None
     elif kind == "Boolean":
         values = [flag(part) for part in text.split()]
     elif kind in ("String", "Enumeration", "Binary"):
@@ -161,10 +161,10 @@ def _value(parameter: etree._Element, units: Units, where: str) -> Value:
         try:
             values = [bytes.fromhex(v) for v in values]
         except ValueError:
-            raise SSPError(f"{where}: '{text}' is no hexadecimal number") from None
+            raise SSPError(f"{where}: '{text}' must be hexadecimal digits, two for each byte") from None
     sizes = [d.get("size", "") for d in parameter.iterfind(f"{SSC}:Dimension", NAMESPACES)]
     if not all(size.isascii() and size.isdigit() and len(size) < 10 for size in sizes):
-        raise SSPError(f"{where}: dimensions {sizes} are no whole numbers")
+        raise SSPError(f"{where}: dimensions {sizes} must be whole numbers")
     shape = [int(size) for size in sizes]
     if shape or len(values) != 1:
         try:
@@ -180,12 +180,14 @@ def _mapped(value: Value, entry: etree._Element, where: str) -> Value:
     for child in entry:
         name = str(child.tag).rpartition("}")[2]
         if name.endswith("MappingTransformation"):
-            raise SSPError(f"{where}: a {name} is not supported, a LinearTransformation is")
+            raise SSPError(f"{where}: a {name} is not supported; use a LinearTransformation")
     linear = entry.find(f"{SSC}:LinearTransformation", NAMESPACES)
     keep = flag(entry.get("suppressUnitConversion"))
     if linear is None:
         return replace(value, keep_unit=keep)
     factor, offset = factor_and_offset(linear, where)
     if value.kind not in _REALS:
-        raise SSPError(f"{where}: a LinearTransformation of {value.kind} values is not defined")
+        raise SSPError(
+            f"{where}: a LinearTransformation needs real numbers, and the value is of type {value.kind}"
+        )
     return replace(value, factor=factor, offset=offset, keep_unit=keep)

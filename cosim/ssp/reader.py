@@ -3,12 +3,12 @@
     system = read_ssp("loop.ssp")
     system = read_ssp("loop.ssp", replace={"control": MyController()})
 
-Components are FMUs with the start values that the package binds to them; nested systems are
-flattened, `plant.damper` becomes the participant `plant_damper`; signal dictionaries,
+Components are FMUs with the start values that the package binds to them. Nested systems are
+flattened: `plant.damper` becomes the participant `plant_damper`. Signal dictionaries,
 connectors of systems, units and linear transformations are resolved to plain connections.
-What is not supported is an error that names the element: mapping transformations, other
-packages as components, clocks. fmus/ssp.py writes SSPs, format.py says what an SSP of
-ours tells beyond the standard.
+An element that is not supported is an error that names it: mapping transformations, other
+packages as components, clocks. fmus/packaging/ssp.py writes SSPs; format.py lists the
+annotations in which structcosim goes beyond the standard.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from .structure import Element, Link, Node, Structure
 
 @dataclass(frozen=True)
 class Experiment:
-    """How a package says that it is run; None where it does not say, times in s."""
+    """The default experiment of a package, times in s; None where the package gives no value."""
 
     start: float | None = None
     stop: float | None = None
@@ -65,7 +65,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Package:
-    """What an SSP holds: the system, and its default experiment."""
+    """The contents of an SSP: the system, and its default experiment."""
 
     system: System
     experiment: Experiment
@@ -74,11 +74,11 @@ class Package:
 def read_ssp(
     path: str | PathLike[str], *, replace: Mapping[str, Component | type[Participant]] | None = None
 ) -> System:
-    """Return the system of an SSP; `replace` puts participants in the place of components, by name.
+    """Return the system of an SSP; `replace` gives participants that replace components, by name.
 
-    A participant in the place of a component has ports with the names of its connectors; the
-    values that the package binds to that component are not for it. A class is made with its
-    own start values, and acts with the period that the component has.
+    A replacement needs ports with the names of the component's connectors; it does not take
+    the values that the package binds to the component. A class is instantiated with its own
+    start values, and acts with the period of the component.
     """
     return read_package(path, replace=replace).system
 
@@ -98,13 +98,13 @@ class _Reader:
         self.where = archive.path.name
         self.archive = archive
         self.replace = replace
-        #: what took the place of components
+        #: the replacements of components by name
         self.replaced: dict[str, Component] = {}
         self.extraction: Extraction | None = None
         self.root = parse_xml(self.read(ROOT, self.where), f"{self.where}/{ROOT}")
         version = self.root.get("version", "none")
         if self.root.tag != tag(SSD, "SystemStructureDescription") or version not in VERSIONS:
-            raise SSPError(f"{self.where} has SSP version {version}; 1.0 and 2.0 are supported")
+            raise SSPError(f"{self.where} has SSP version {version}; versions 1.0 and 2.0 are supported")
         self.structure = Structure(self.root, self.where)
         self.units = Units.of(self.root, SSD, self.where)
         self.parameters = Parameters(self.structure.root, self.read, self.where)
@@ -118,7 +118,7 @@ class _Reader:
         uri = urlsplit(source)
         name = posixpath.normpath(unquote(uri.path))
         if uri.scheme or uri.netloc or uri.fragment or name.startswith(("/", "..")):
-            raise SSPError(f"{where}: '{source}' is outside of the package, which is not supported")
+            raise SSPError(f"{where}: '{source}' is outside the package, which is not supported")
         if name not in self.archive.names:
             hint = did_you_mean(name, self.archive.names)
             raise SSPError(f"{where}: the package has no file '{name}'{hint}")
@@ -161,7 +161,7 @@ class _Reader:
     # ---------------------------------------------------------------------- components
 
     def _other(self, name: str, element: Element) -> Component:
-        """Return the participant that takes the place of a component."""
+        """Return the participant that replaces a component."""
         given = self.replace[name]
         if isinstance(given, type):
             where = f"{self.where}: {name} is replaced by a {given.__name__}"
@@ -177,10 +177,10 @@ class _Reader:
         where = f"{self.where}: component {'.'.join(element.path)}"
         source = element.xml.get("source")
         if not source:
-            raise SSPError(f"{where} has no FMU (no source); give a participant in its place, replace=")
+            raise SSPError(f"{where} has no FMU (no source attribute); give a replacement, replace=")
         kind = element.xml.get("type", FMU_TYPE)
         if kind != FMU_TYPE:
-            raise SSPError(f"{where} is of type {kind}, which is not supported; FMUs ({FMU_TYPE}) are")
+            raise SSPError(f"{where} is of type {kind}, which is not supported; use FMUs ({FMU_TYPE})")
         name = self._name(source, where)
         if self.extraction is None:
             self.extraction = self.archive.extraction()
@@ -194,7 +194,7 @@ class _Reader:
         return fmu
 
     def _options(self, element: Element, where: str) -> dict[str, Any]:
-        """Return the keywords of an FMU that the element and our annotation give."""
+        """Return the keywords of an FMU that the element and its annotation give."""
         own = own_annotation(element.xml, SSD, "participant")
         options: dict[str, Any] = {"as_block": own.get("kind") == "block"}
         interface = element.xml.get("implementation", "any")
@@ -240,11 +240,11 @@ class _Reader:
         names = value.value if isinstance(value.value, list) else [value.value]
         for name in names:
             if name not in items:
-                raise SSPError(f"'{name}' is no item of {variable.name}" + did_you_mean(name, items))
+                raise SSPError(f"{variable.name} has no item '{name}'" + did_you_mean(name, items))
         return [items[n] for n in names] if isinstance(value.value, list) else items[value.value]
 
     def _along(self, link: Link, value: Value, unit: Unit) -> Any:
-        """Return the value of a system's connector as what arrives at a component's."""
+        """Return the value of a system's connector as it arrives at a component's connector."""
         first = self.units.of_name(self.structure.units.get(link.origin) or value.unit)
         scale, offset = self._transformation(link, first, unit)
         plain = value.in_unit(first, self.units)
@@ -260,7 +260,8 @@ class _Reader:
         late = None if initial is None else np.array(initial)
         if len(link.edges) > 1 and any(edge.initial is not None for edge in link.edges):
             raise SSPError(
-                f"{self.where}: {text} is one step late inside of a system, which is not supported"
+                f"{self.where}: {text} is delayed on a part of its way, which is not supported; "
+                "delay a direct connection"
             )
         try:
             transformation = None
@@ -270,7 +271,7 @@ class _Reader:
                 ends = (source.unit, source.definition), (sink.unit, sink.definition)
                 transformation = self._transformation(link, *ends, relative)
             elif any((edge.factor, edge.offset) != (1.0, 0.0) for edge in link.edges):
-                transformation = (0.0, 0.0)  # which is refused for a text
+                transformation = (0.0, 0.0)  # `connect` refuses any for a string
             system.connect(a, b, initial=late, transformation=transformation)
         except WiringError as error:
             names = (element_name(node.path) for node in (origin, target))
@@ -283,9 +284,9 @@ class _Reader:
     def _transformation(
         self, link: Link, first: Unit, last: Unit, relative: bool = False
     ) -> tuple[float, float]:
-        """Return (factor, offset) from a port's unit over all connectors to another port's unit.
+        """Return (factor, offset) from a port's unit through all connectors to another port's unit.
 
-        Relative quantities are differences: their units are converted without offset.
+        Relative quantities are differences; their units are converted without an offset.
         """
         scale, offset, unit = 1.0, 0.0, first
 
@@ -331,4 +332,4 @@ def _whole(text: str, where: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise SSPError(f"{where}: '{text}' is no whole number") from None
+        raise SSPError(f"{where}: '{text}' must be a whole number") from None

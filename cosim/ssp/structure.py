@@ -1,9 +1,9 @@
 """The structure in an SSD: nested systems and signal dictionaries, flattened to links between components.
 
-A connector of a component, a system or a signal dictionary is a node of a graph, a
-connection an edge. Which way a value flows follows from the kinds of the two connectors,
-not from "start" and "end" (SSP 2.0, 5.3.2.1). What feeds an input of a component is
-found by walking the edges back to the output of another one.
+A connector of a component, a system or a signal dictionary is a node of a graph; a
+connection is an edge. The kinds of the two connectors give the direction of the value,
+not "start" and "end" (SSP 2.0, 5.3.2.1). The source of a component's input is found by
+walking the edges back to the output of another component.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MAPPINGS = [f"{SSC}:{kind}MappingTransformation" for kind in ("Boolean", "Integ
 
 @dataclass(frozen=True)
 class Node:
-    """A connector: path of its element, name; of an array in SSP 2.0 the index of one element."""
+    """A connector: the path of its element, its name, and in an array of SSP 2.0 the index of one element."""
 
     path: Path
     name: str
@@ -36,12 +36,12 @@ class Node:
 
     @property
     def text(self) -> str:
-        """The name with the index as in a port's name."""
+        """The name with the index, written as in a port's name."""
         return self.name + (f"[{','.join(map(str, self.index))}]" if self.index else "")
 
     @property
     def whole(self) -> Node:
-        """The array of an element."""
+        """The connector without the index."""
         return Node(self.path, self.name)
 
     def __str__(self) -> str:
@@ -50,7 +50,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Edge:
-    """target = factor * (source, in the target's unit) + offset; `initial`: one step late, as annotated."""
+    """target = factor * (source, in the target's unit) + offset; with `initial`, one step late."""
 
     source: Node
     target: Node
@@ -65,14 +65,14 @@ class Edge:
 
 @dataclass(frozen=True)
 class Link:
-    """The way of a value to a component's connector; `origin` may be a system's, which nothing feeds."""
+    """The path of a value to a component's connector; `origin` may be an unconnected input of a system."""
 
     origin: Node
     edges: tuple[Edge, ...]
 
     @property
     def target(self) -> Node:
-        """The connector that it feeds."""
+        """The connector at its end."""
         return self.edges[-1].target
 
 
@@ -84,12 +84,12 @@ class Element:
     xml: etree._Element
     kinds: dict[str, str] = field(default_factory=dict)
     children: dict[str, Element] = field(default_factory=dict)
-    #: of a reference: where the dictionary's signals are nodes
+    #: of a reference: the path under which the dictionary's signals are nodes
     dictionary: Path | None = None
 
     @property
     def is_component(self) -> bool:
-        """Tell whether this is an FMU."""
+        """Tell whether this is a component, not a system or a reference."""
         return bool(self.xml.tag == tag(SSD, "Component"))
 
 
@@ -103,7 +103,7 @@ class Structure:
         self.feeds: dict[Node, Edge] = {}
         system = root.find(f"{SSD}:System", NAMESPACES)
         if system is None:
-            raise SSPError(f"{where} has no System")
+            raise SSPError(f"{where} has no System element")
         self.root = self._element(system, (), [])
 
     # ------------------------------------------------------------------------ elements
@@ -139,10 +139,10 @@ class Structure:
         for child in system.xml.iterfind(f"{SSD}:Elements/*", NAMESPACES):
             name = child.get("name", "")
             if not name or name in system.children:
-                raise SSPError(f"{self._at(system.path)} has two elements '{name}', or one without a name")
+                raise SSPError(f"{self._at(system.path)}: the element name '{name}' is empty or used twice")
             known = {tag(SSD, kind) for kind in ("Component", "System", "SignalDictionaryReference")}
             if child.tag not in known:
-                raise SSPError(f"{self._at((*system.path, name))}: <{child.tag}> is no element of SSP")
+                raise SSPError(f"{self._at((*system.path, name))}: <{child.tag}> is not an element of SSP")
             system.children[name] = self._element(child, (*system.path, name), [own, *dictionaries])
         for c in system.xml.iterfind(f"{SSD}:Connections/{SSD}:Connection", NAMESPACES):
             edge = self._edge(system, c)
@@ -159,7 +159,7 @@ class Structure:
         if found is None:
             known = [n for d in dictionaries for n in d]
             hint = did_you_mean(name, known)
-            raise SSPError(f"{self._at(reference.path)}: there is no signal dictionary '{name}'{hint}")
+            raise SSPError(f"{self._at(reference.path)}: unknown signal dictionary '{name}'{hint}")
         reference.dictionary = found
 
     def _at(self, path: Path) -> str:
@@ -172,14 +172,14 @@ class Structure:
         (a, from_a), (b, from_b) = ends
         text = f"{self.where}: connection {a} - {b}"
         if from_a is None and from_b is None:
-            raise SSPError(f"{text}: neither connector says which way the value flows (kind inout)")
+            raise SSPError(f"{text}: both connectors are of kind inout, so that the direction is unknown")
         if from_a == from_b:
-            what = "give a value" if from_a else "take one"
-            raise SSPError(f"{text}: both connectors {what}; connect an output to an input")
+            kind = "outputs" if from_a else "inputs"
+            raise SSPError(f"{text}: both connectors are {kind}; connect an output to an input")
         source, target = (a, b) if from_a or from_b is False else (b, a)
         for mapping in _MAPPINGS:
             if c.find(mapping, NAMESPACES) is not None:
-                raise SSPError(f"{text}: a {mapping[4:]} is not supported, a LinearTransformation is")
+                raise SSPError(f"{text}: a {mapping[4:]} is not supported; use a LinearTransformation")
         factor, offset = 1.0, 0.0
         linear = c.find(f"{SSC}:LinearTransformation", NAMESPACES)
         if linear is not None:
@@ -195,13 +195,13 @@ class Structure:
         )
 
     def _end(self, system: Element, c: etree._Element, which: str) -> tuple[Node, bool | None]:
-        """Return a connection's connector, and whether it gives the value (None: not said)."""
+        """Return a connection's connector, and whether it gives the value (None: unknown)."""
         name = c.get(f"{which}Connector", "")
         where = c.get(f"{which}Element")
         element = system if where is None else system.children.get(where)
         if element is None:
             raise SSPError(
-                f"{self._at(system.path)}: a connection names the element '{where}'"
+                f"{self._at(system.path)}: a connection names the unknown element '{where}'"
                 + did_you_mean(str(where), system.children)
             )
         kind = element.kinds.get(name)
@@ -212,13 +212,13 @@ class Structure:
             )
         indices = c.get(f"{which}Indices", "").split()
         if not all(re.fullmatch(r"[1-9]\d{0,8}", i) for i in indices):
-            raise SSPError(f"{self._at(element.path)}.{name}: indices {indices} are no whole numbers from 1")
+            raise SSPError(f"{self._at(element.path)}.{name}: indices {indices} must be whole numbers from 1")
         node = Node(element.dictionary or element.path, name, tuple(map(int, indices)))
         gives = None if kind in _EITHER else (kind in _GIVING) != (element is system)
         return node, gives
 
     def links(self) -> Iterator[Link]:
-        """Yield what feeds the connectors of components, in the order of the file."""
+        """Yield the links to the connectors of components, in the order of the file."""
         for target, edge in self.feeds.items():
             if target.path in self.components:
                 yield self._trace(edge)

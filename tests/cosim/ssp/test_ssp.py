@@ -6,7 +6,6 @@ and an integrator x' = u, so that a lost factor, offset or step shows.
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -14,103 +13,20 @@ import pytest
 
 from cosim import FMU, CosimError, System, read_ssp, simulate
 from cosim.ssp import read_package
-from cosim.ssp.format import NAMESPACES
-from fmus.export import export
-from tests.cosim.fmi.probe import probe
-from tests.cosim.parts import Gain, Integrator
-from tests.fmus.packaging.ssp_parts import Damper, Watch, schema
-
-SPACES = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
-REAL = "<ssc:Real/>"
-
-
-def component(name, source, connectors, more="", **attributes):
-    """A component; connectors are "name kind [unit]"."""
-    listed = ""
-    for text in connectors:
-        name_, kind, *unit = text.split()
-        given = f' unit="{unit[0]}"' if unit else ""
-        listed += f'<ssd:Connector name="{name_}" kind="{kind}"><ssc:Real{given}/></ssd:Connector>'
-    extra = "".join(f' {k}="{v}"' for k, v in attributes.items())
-    return (
-        f'<ssd:Component name="{name}" source="resources/{source}.fmu"{extra}>'
-        f"<ssd:Connectors>{listed}</ssd:Connectors>{more}</ssd:Component>"
-    )
-
-
-def connection(start, end, inside="", **attributes):
-    """A connection between "element.connector" or "connector", of the system itself."""
-    text = ""
-    for which, where in (("start", start), ("end", end)):
-        element, _, name = where.rpartition(".")
-        text += f' {which}Element="{element}"' if element else ""
-        text += f' {which}Connector="{name}"'
-    extra = "".join(f' {k}="{v}"' for k, v in attributes.items())
-    return f"<ssd:Connection{text}{extra}>{inside}</ssd:Connection>"
-
-
-def system(elements, connections="", before="", after="", name="top"):
-    joined = f"<ssd:Connections>{connections}</ssd:Connections>" if connections else ""
-    inside = f"{before}<ssd:Elements>{elements}</ssd:Elements>{joined}{after}"
-    return f'<ssd:System name="{name}">{inside}</ssd:System>'
-
-
-def parameters(**values):
-    """A parameter set of reals, in place."""
-    listed = "".join(
-        f'<ssv:Parameter name="{n.replace("__", ".")}"><ssv:Real value="{v}"/></ssv:Parameter>'
-        for n, v in values.items()
-    )
-    inside = f"<ssv:Parameters>{listed}</ssv:Parameters>"
-    return f'<ssv:ParameterSet version="1.0" name="set" {SPACES}>{inside}</ssv:ParameterSet>'
-
-
-def binding(inside="", **attributes):
-    extra = "".join(f' {k}="{v}"' for k, v in attributes.items())
-    values = f"<ssd:ParameterValues>{inside}</ssd:ParameterValues>" if "source" not in attributes else inside
-    return f"<ssd:ParameterBinding{extra}>{values}</ssd:ParameterBinding>"
-
-
-def bindings(*each):
-    return f"<ssd:ParameterBindings>{''.join(each)}</ssd:ParameterBindings>"
-
-
-@pytest.fixture(scope="module")
-def fmus(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fmus")
-    made = {kind.__name__: export(kind(), folder / f"{kind.__name__}.fmu") for kind in (Gain, Integrator)}
-    made |= {kind.__name__: export(kind(), folder / f"{kind.__name__}.fmu") for kind in (Damper, Watch)}
-    made["probe"] = probe(folder / "probe.fmu", "3.0")
-    return made
-
-
-@pytest.fixture
-def package(tmp_path, fmus):
-    """Write an SSP: valid by the schema unless it is meant not to be."""
-
-    def write(body, after="", files=None, version="1.0", valid=True):
-        text = (
-            f'<ssd:SystemStructureDescription {SPACES} version="{version}" name="it">{body}{after}'
-            "</ssd:SystemStructureDescription>"
-        )
-        if valid:
-            from lxml import etree
-
-            schema(version, "Description").assertValid(etree.fromstring(text))
-        path = tmp_path / "it.ssp"
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("SystemStructure.ssd", text)
-            for name, data in (files or {}).items():
-                archive.writestr(name, data)
-            for name, fmu in fmus.items():
-                archive.write(fmu, f"resources/{name}.fmu")
-        return path
-
-    return write
-
-
-GAIN = ["x input", "u output"]
-SUM = ["u input", "x output", "y output"]
+from tests.cosim.parts import Gain
+from tests.cosim.ssp.packages import (
+    GAIN,
+    REAL,
+    SPACES,
+    SUM,
+    TWO,
+    binding,
+    bindings,
+    component,
+    connection,
+    parameters,
+    system,
+)
 
 
 def value(path, port, **options):
@@ -165,7 +81,7 @@ def test_signal_dictionaries_join_what_refers_to_them(package):
     path = package(system(elements, connection("g.u", "there.force"), after=dictionary))
     assert [str(c) for c in read_ssp(path).connections] == ["sub_sum.u <- g.u"]
     lost = package(system(component("g", "Gain", GAIN) + refer("there")))
-    with pytest.raises(CosimError, match=r"it\.ssp: there: there is no signal dictionary 'bus'"):
+    with pytest.raises(CosimError, match=r"it\.ssp: there: unknown signal dictionary 'bus'"):
         read_ssp(lost)
 
 
@@ -276,98 +192,6 @@ def test_a_component_without_a_usable_fmu_can_be_replaced(package):
     system_ = read_ssp(path, replace={"g": Gain()})
     system_.participants["s"] = FMU(system_.participants["s"].path, start={"x": 1.0})
     assert simulate(system_, step=1.0, stop=2.0)["s.x"].tolist() == [1.0, -19.0, 361.0]
-
-
-TWO = component("g", "Gain", GAIN) + component("h", "Gain", GAIN)
-MAPPING = (
-    '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
-    "</ssc:BooleanMappingTransformation>"
-)
-REFUSED = [
-    (system(TWO, connection("g.u", "h.u")), r"connection g\.u - h\.u: both connectors give a value"),
-    (system(TWO, connection("g.x", "h.x")), r"connection g\.x - h\.x: both connectors take one"),
-    (system(TWO, connection("g.u", "k.x")), r"names the element 'k' \(available: g, h\)"),
-    (system(TWO, connection("g.uu", "h.x")), r"it\.ssp: g has no connector 'uu'.*did you mean 'u'"),
-    (
-        system(TWO, connection("g.u", "h.x") + connection("h.u", "h.x")),
-        r"h\.x is fed by g\.u and by h\.u; an input has one source",
-    ),
-    (system(TWO, connection("g.u", "h.x", MAPPING)), r"a BooleanMappingTransformation is not supported"),
-    (system(TWO + component("g", "Gain", GAIN)), r"the root system has two elements 'g'"),
-    (
-        system(component("a.b", "Gain", GAIN) + component("a_b", "Gain", GAIN)),
-        r"a\.b and a_b would both be 'a_b'; rename one",
-    ),
-    (
-        system(component("s", "Gain", GAIN, type="application/x-ssp-package")),
-        r"component s is of type application/x-ssp-package, which is not supported",
-    ),
-    (
-        system('<ssd:Component name="s" source="../../etc/passwd"/>'),
-        r"component s: '\.\./\.\./etc/passwd' is outside of the package",
-    ),
-    (
-        system('<ssd:Component name="s" source="https://example.org/a.fmu"/>'),
-        r"'https://example\.org/a\.fmu' is outside of the package",
-    ),
-    (
-        system(
-            component("g", "Gain", ["K parameter"]) + component("k", "Gain", GAIN), connection("k.u", "g.K")
-        ),
-        r"k\.u -> g\.K connects a parameter to another component",
-    ),
-    (
-        system(component("g", "Gain", ["x input", "z output"]), connection("g.z", "g.x")),
-        r"g\.z -> g\.x: g has no output 'z'",
-    ),
-    (
-        system(component("g", "Gain", GAIN, bindings(binding("", source="resources/no.ssv")))),
-        r"parameter binding of g: the package has no file 'resources/no\.ssv'",
-    ),
-    (
-        system(component("g", "Gain", GAIN, bindings(binding("", source="K.ssv", sourceBase="component")))),
-        r"sourceBase 'component' is not supported",
-    ),
-]
-
-
-@pytest.mark.parametrize(("body", "message"), REFUSED, ids=range(len(REFUSED)))
-def test_what_is_not_supported_is_named(package, body, message):
-    with pytest.raises(CosimError, match=message):
-        read_ssp(package(body))
-
-
-def test_files_that_are_no_ssp(package, tmp_path):
-    with pytest.raises(CosimError, match=r"there is no file .*none\.ssp"):
-        read_ssp(tmp_path / "none.ssp")
-    (tmp_path / "text.ssp").write_text("text")
-    with pytest.raises(CosimError, match="is no SSP: it is not a ZIP archive"):
-        read_ssp(tmp_path / "text.ssp")
-    with zipfile.ZipFile(tmp_path / "empty.ssp", "w") as archive:
-        archive.writestr("a.txt", "")
-    with pytest.raises(CosimError, match=r"is no SSP: it has no SystemStructure\.ssd at its top"):
-        read_ssp(tmp_path / "empty.ssp")
-    with pytest.raises(CosimError, match=r"has SSP version 3\.0; 1\.0 and 2\.0 are supported"):
-        read_ssp(package(system(TWO), version="3.0", valid=False))
-    with pytest.raises(CosimError, match=r"SystemStructure\.ssd is broken XML"):
-        read_ssp(package("<ssd:System", valid=False))
-
-
-def test_an_archive_that_leads_outside_is_refused(tmp_path):
-    with zipfile.ZipFile(tmp_path / "slip.ssp", "w") as archive:
-        archive.writestr("../evil.fmu", "")
-        archive.writestr("SystemStructure.ssd", "")
-    with pytest.raises(CosimError, match=r"'\.\./evil\.fmu' in it leads out of the folder"):
-        read_ssp(tmp_path / "slip.ssp")
-
-
-def test_entities_are_not_expanded(tmp_path):
-    bomb = '<!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>'
-    text = f'{bomb}<ssd:SystemStructureDescription {SPACES} version="1.0" name="&b;"/>'
-    with zipfile.ZipFile(tmp_path / "bomb.ssp", "w") as archive:
-        archive.writestr("SystemStructure.ssd", text)
-    with pytest.raises(CosimError, match="document type declaration"):
-        read_ssp(tmp_path / "bomb.ssp")
 
 
 def test_the_files_live_as_long_as_the_participants(package):
