@@ -117,9 +117,11 @@ def _describe(value: Any, seen: dict[int, int]) -> str:
         defaults = _describe([value.__defaults__, sorted((value.__kwdefaults__ or {}).items())], seen)
         cells = [_describe(c.cell_contents, seen) for c in value.__closure__ or ()]
         globals_ = [f"{n}={_describe(v, seen)}" for n, v in used.items()]
+        code = value.__code__
+        if code.co_consts[:1] == (value.__doc__,):  # the docstring; it does not change what is computed
+            code = code.replace(co_consts=(None, *code.co_consts[1:]))
         return (
-            f"function({_describe(value.__code__, seen)},{defaults},{cells},{globals_},"
-            f"{getattr(value, 'kernel', '')})"
+            f"function({_describe(code, seen)},{defaults},{cells},{globals_},{getattr(value, 'kernel', '')})"
         )
     if isinstance(value, types.ModuleType):
         return f"module({value.__name__})"

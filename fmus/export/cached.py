@@ -2,8 +2,9 @@
 
     plant = as_fmu(Oscillator())
 
-What a scenario uses to step its plant as an FMU. The file is keyed by the compiled
-kernels, the start record and the exporter's own source.
+The file is keyed by what goes into it: the compiled kernels, the start record, the
+declarations (their units and meanings stand in the modelDescription), and the exporter.
+Docstrings and comments of a plant are not part of the key.
 """
 
 from __future__ import annotations
@@ -22,16 +23,25 @@ from .link import warm_up
 
 @lru_cache(maxsize=1)
 def _exporter() -> bytes:
-    """Return a hash of the exporter's source, and of how it compiles."""
+    """Return a hash of the exporter's source, and of the compiler's options."""
     here = Path(__file__).parent
     files = [*sorted([*here.glob("*.py"), *here.glob("c/*")]), Path(c_compiler.__file__)]
     return hashlib.sha256(b"".join(f.read_bytes() for f in files)).digest()
 
 
+def cache_key(participant: Participant) -> str:
+    """Return a hash of all that the FMU of a participant depends on."""
+    variables = participant.variables.values()
+    declared = [(v.name, v.kind, v.shape, v.unit, v.meaning, v.min, v.max, v.fixed) for v in variables]
+    rate = getattr(participant, "sample_period", None)  # the default experiment follows from it
+    key = hashlib.sha256(_exporter() + kernel_key(participant).encode() + participant.memory.tobytes())
+    key.update(repr((type(participant).__name__, declared, rate)).encode())
+    return key.hexdigest()[:32]
+
+
 def as_fmu(participant: Participant) -> FMU:
     """Export a participant with the values it has now, and load the FMU; `FMU.source` is the participant."""
-    digest = hashlib.sha256(_exporter() + kernel_key(participant).encode() + participant.memory.tobytes())
-    path = cache_directory() / "fmus" / digest.hexdigest()[:32] / f"{type(participant).__name__}.fmu"
+    path = cache_directory() / "fmus" / cache_key(participant) / f"{type(participant).__name__}.fmu"
     if not path.exists():
         warm_up()
         export(participant, path)

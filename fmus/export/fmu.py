@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import struct
 import tempfile
+import uuid
 import zipfile
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -116,11 +117,12 @@ def _default_experiment(participant: Participant) -> DefaultExperiment:
 
 
 def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDescription.xml") -> None:
-    """Write a zip archive whose bytes depend on its contents only; whoever looks sees all of it.
+    """Write a zip archive whose bytes depend on its contents only; make its folder if there is none.
 
-    Makes its folder. Raises ExportError when it cannot be written.
+    The archive appears under its name when it is complete, so several threads and processes may
+    write to one path.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -123,12 +123,12 @@ class FloorLoad(Block):
     w = Output("forces on the floors", shape="n", unit="N")
 
     def step(self, t: float, h: float) -> None:
-        q = t / self.dt
-        last = self.table.shape[0] - 2
-        i = min(math.floor(q + 1e-9), last)
-        part = min(q - i, 1.0)  # after its end the table holds its last row
+        rows = self.table.shape[0]
+        q = min(max(t / self.dt, 0.0), rows - 1.0)  # before its start and after its end the table is held
+        i = max(min(math.floor(q + 1e-9), rows - 2), 0)
+        after = min(i + 1, rows - 1)
         for j in range(self.w.shape[0]):
-            self.w[j] = self.table[i, j] + part * (self.table[i + 1, j] - self.table[i, j])
+            self.w[j] = self.table[i, j] + (q - i) * (self.table[after, j] - self.table[i, j])
 
 
 def load_forces(path: str | PathLike[str], floors: int) -> tuple[Array, float]:

@@ -1,7 +1,9 @@
-/* Snapshots: the record with mode and time, in one piece of memory whose bytes are also the
-   serialised form. Until initialisation ends the record is what was set (`settings`), so that
-   `initialize` runs again on the restored settings; afterwards it is the live record. Outputs and
-   derivatives are computed again after a restore. */
+/* Snapshots: the record with mode and time, in one piece of memory. Until initialisation ends the
+   record holds the settings, so that `initialize` runs again on the restored settings; afterwards
+   it is the live record. Outputs and derivatives are computed again after a restore.
+
+   The serialised form is the bytes of a snapshot and their checksum: a record also holds indices
+   that the kernels compute with, so damaged bytes must not become a state. */
 
 #include "core.h"
 
@@ -18,7 +20,16 @@ struct snapshot {
 
 #define BEFORE_RUNNING (INSTANTIATED | PREPARED | INITIALIZING)
 
-size_t core_serialized_size(void) { return sizeof(struct snapshot) + model.n_slots * sizeof(double); }
+static size_t snapshot_size(void) { return sizeof(struct snapshot) + model.n_slots * sizeof(double); }
+
+size_t core_serialized_size(void) { return snapshot_size() + sizeof(uint64_t); }
+
+/* FNV-1a: any change of a single byte changes it. */
+static uint64_t checksum(const unsigned char *bytes, size_t size) {
+    uint64_t sum = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < size; i++) sum = (sum ^ bytes[i]) * 0x100000001b3u;
+    return sum;
+}
 
 static status check_snapshot(struct instance *c, const struct snapshot *s, const char *function) {
     unsigned alone = s->mode & (BEFORE_RUNNING | EVENT | CONTINUOUS_TIME | STEPPING | TERMINATED | BROKEN);
@@ -28,14 +39,14 @@ static status check_snapshot(struct instance *c, const struct snapshot *s, const
     if (s->interface != c->interface)
         return core_refuse(c, function, "the state is one of the other interface (ME or CS)");
     if (alone != s->mode || !alone || (alone & (alone - 1)) || (alone & other) || !isfinite(s->t) ||
-        !isfinite(s->start_time) || isnan(s->stop_time))
+        !isfinite(s->start_time) || isnan(s->stop_time) || !isfinite(s->step))
         return core_refuse(c, function, "the state is damaged");
     return OK;
 }
 
 status core_snapshot(struct instance *c, void **snapshot, const char *function) {
     if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
-    struct snapshot *s = *snapshot ? *snapshot : calloc(1, core_serialized_size());
+    struct snapshot *s = *snapshot ? *snapshot : calloc(1, snapshot_size());
     if (!s) return core_refuse(c, function, "out of memory");
     strncpy(s->token, model.token, sizeof s->token - 1);
     s->interface = c->interface;
@@ -74,7 +85,9 @@ status core_serialize(struct instance *c, const void *snapshot, unsigned char *b
     if (core_need(c, bytes, 1, "serializedState", function)) return FAILED;
     if (size < core_serialized_size())
         return core_refuse(c, function, "%zu bytes for a state of %zu", size, core_serialized_size());
-    memcpy(bytes, snapshot, core_serialized_size());
+    memcpy(bytes, snapshot, snapshot_size());
+    uint64_t sum = checksum(bytes, snapshot_size());
+    memcpy(bytes + snapshot_size(), &sum, sizeof sum);
     return OK;
 }
 
@@ -84,15 +97,18 @@ status core_deserialize(struct instance *c, const unsigned char *bytes, size_t s
     if (core_need(c, snapshot, 1, "FMUState", function)) return FAILED;
     if (size != core_serialized_size())
         return core_refuse(c, function, "%zu bytes for a state of %zu", size, core_serialized_size());
-    struct snapshot *s = malloc(size);
+    uint64_t sum;
+    memcpy(&sum, bytes + snapshot_size(), sizeof sum);
+    if (sum != checksum(bytes, snapshot_size())) return core_refuse(c, function, "the state is damaged");
+    struct snapshot *s = malloc(snapshot_size());
     if (!s) return core_refuse(c, function, "out of memory");
-    memcpy(s, bytes, size); /* bytes of the host need not be aligned */
+    memcpy(s, bytes, snapshot_size()); /* bytes of the host need not be aligned */
     if (check_snapshot(c, s, function)) {
         free(s);
         return FAILED;
     }
     if (*snapshot) { /* as in core_snapshot: the host may hand in an old one */
-        memcpy(*snapshot, s, size);
+        memcpy(*snapshot, s, snapshot_size());
         free(s);
     } else *snapshot = s;
     return OK;

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ from cosim import Block, CompilationError, Input, Output
 from cosim.codegen.c_compiler import fmi_headers
 from cosim.codegen.kernels import cache_directory
 from fmus.export import ExportError, export
-from fmus.export.fmu import FMI_VERSIONS
+from fmus.export.fmu import FMI_VERSIONS, write_archive
 from fmus.export.link import build_model, check_symbols
 from fmus.plants.oscillator import Oscillator
 from tests.fmus.export.host import ERROR, OK, Accumulator, Host
@@ -170,6 +171,17 @@ def test_the_front_end_compiles_without_a_warning(tmp_path: Path, version: str) 
     command = [sys.executable, "-m", "ziglang", "cc", *flags, "-Wshadow", "-Werror", "-c", "model.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_threads_may_write_one_archive(tmp_path: Path) -> None:
+    """Each writes a file of its own and renames it; whoever reads sees a whole archive."""
+    path, files = tmp_path / "one.fmu", {"modelDescription.xml": b"x" * 100_000}
+    with ThreadPoolExecutor(8) as pool:
+        for done in [pool.submit(write_archive, path, files) for _ in range(64)]:
+            done.result()
+    with zipfile.ZipFile(path) as archive:
+        assert archive.read("modelDescription.xml") == files["modelDescription.xml"]
+    assert list(tmp_path.iterdir()) == [path]
 
 
 class Gate(Block):

@@ -3,10 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 
 from cosim import CosimError, RecordError, System, simulate
+from fmus.export import export
 from fmus.loads.wind import AcrossWind, FloorLoad, across_wind, coherence_factor, load_forces
 from scenarios.tall_building.building import STORY_HEIGHTS
 
@@ -70,6 +72,27 @@ def test_load_is_linear_between_its_samples_and_holds_at_the_end() -> None:
         for j in range(2):
             wanted = np.interp(acts, [0.0, 0.1, 0.2], table[:, j])
             np.testing.assert_allclose(result["load.w"][:, j], wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("t", [-1e6, -1.0, -1e-30, 0.0, 0.3, 1e18, 1e300])
+def test_a_load_holds_its_ends_at_any_time(t: float) -> None:
+    """The row number is bounded before it is an integer; a table of one sample is that sample."""
+    load = FloorLoad(table=np.array([[1.0, 3.0], [10.0, 1.0], [4.0, -5.0]]), dt=0.1)
+    load.step(t, 0.02)
+    assert load.w.tolist() == ([1.0, 3.0] if t <= 0.0 else [4.0, -5.0])
+    one = FloorLoad(table=np.array([[2.0, 7.0]]), dt=0.1)
+    one.step(t, 0.02)
+    assert one.w.tolist() == [2.0, 7.0]
+
+
+def test_an_exported_load_may_start_long_before_its_table(tmp_path: Path) -> None:
+    """In FMPy, from t = -1e6 s; reading outside the table ended the host's process."""
+    path = export(FloorLoad(table=np.array([[1.0, 3.0], [10.0, 1.0]]), dt=0.1), tmp_path / "load.fmu")
+    result = fmpy.simulate_fmu(
+        str(path), start_time=-1e6, stop_time=-1e6 + 0.05, step_size=0.01, output_interval=0.01
+    )
+    assert set(result["w[1]"][1:]) == {1.0}  # the first row is from before the first step
+    assert set(result["w[2]"][1:]) == {3.0}
 
 
 def test_user_records(tmp_path: Path) -> None:
