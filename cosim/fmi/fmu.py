@@ -22,7 +22,7 @@ import numpy as np
 from ..core.participant import Participant, rate
 from ..core.tableaus import TABLEAUS
 from ..errors import FMUError, did_you_mean
-from ..loop.operations import Number
+from ..loop.numbers import Number
 from .clocks import clocks_of
 from .file.archive import Archive
 from .file.display_units import without_units

@@ -8,7 +8,6 @@ in the loop; FMUInstance (fmi/instance.py, fmi/model_exchange.py) for FMUs.
 
 from __future__ import annotations
 
-import ctypes
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -19,8 +18,8 @@ from ..codegen.kernels import kernel_addresses
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from ..core.variables import Array
 from ..errors import CompilationError, DeclarationError
-from ..loop.operations import CALL, COPY, Op
-from ..loop.signals import KERNEL, Failures
+from ..loop.operations import Call, Copy, Operation
+from ..loop.signals import KERNEL, RunSignals
 from ..result import SimulationError
 
 
@@ -31,12 +30,11 @@ class CompiledKernelsWarning(UserWarning):
 class KernelInstance:
     """A Block or Continuous in the loop, compiled or called back."""
 
-    def __init__(self, name: str, participant: Participant, jit: bool, failures: Failures) -> None:
+    def __init__(self, name: str, participant: Participant, jit: bool, failures: RunSignals) -> None:
         self.name = name
         self.failures = failures
         self.participant = participant.fresh()
         self.base = self.participant.memory.ctypes.data
-        self.callbacks: list[Any] = []
         self.is_compiled = jit and participant.compiled
         self._addresses: dict[str, int] = {}
         if self.is_compiled:
@@ -52,9 +50,7 @@ class KernelInstance:
                 self.is_compiled = False
         if not self.is_compiled:
             for kernel in participant.kernels:
-                callback = failures.guard(name, self._interpreted(kernel))
-                self.callbacks.append(callback)
-                self._addresses[kernel] = ctypes.cast(callback, ctypes.c_void_p).value or 0
+                self._addresses[kernel] = failures.callback(name, self._interpreted(kernel))
         states = self.participant.zones["state"]
         self.n_states = states[1] if isinstance(participant, Continuous) else 0
         self.state_address = self.base + 8 * states[0]
@@ -73,7 +69,7 @@ class KernelInstance:
         if "initialize" in self._addresses:
             function = KERNEL(self._addresses["initialize"])
             if function(self.base, t0, 0.0) != 0 and self.failures.exception is None:
-                again = self.failures.guard(self.name, self._interpreted("initialize"))  # for its exception
+                again = KERNEL(self.failures.callback(self.name, self._interpreted("initialize")))
                 if again(self.base, t0, 0.0) == 0:
                     raise SimulationError(f"{self.name} failed in initialize(self); check its parameters")
         if isinstance(self.participant, LinearContinuous) and self.failures.exception is None:
@@ -139,50 +135,49 @@ class KernelInstance:
         """Return the address of a variable."""
         return self.base + 8 * self.participant.variables[port].slot
 
-    def _call(self, kernel: str, text: str, fraction: float, check: tuple[int, int] = (0, 0)) -> Op:
+    def _call(self, kernel: str, text: str, fraction: float, check: tuple[int, int] = (0, 0)) -> Operation:
         how = "" if self.is_compiled else " (Python callback)"
-        return Op(
-            f"{self.name}: {text}{how}" if text else "",
-            CALL,
-            self._addresses[kernel],
-            self.base,
-            check[0],
-            n=check[1],
+        return Call(
+            text=f"{self.name}: {text}{how}" if text else "",
+            function=self._addresses[kernel],
+            storage=self.base,
+            results=check[0],
+            count=check[1],
             fraction=fraction,
             participant=self.name,
         )
 
-    def step(self, fraction: float = 0.0) -> list[Op]:
+    def step(self, fraction: float = 0.0) -> list[Operation]:
         """Run a block."""
         return [self._call("step", "step", fraction, self._outputs)]
 
-    def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
+    def read(self, fraction: float = 0.0, final: bool = True) -> list[Operation]:
         """Evaluate derivatives and outputs; they must be finite unless inputs are still to come."""
         ops = [self._call("derivatives", "", fraction)] if "derivatives" in self._addresses else []
         if "outputs" in self._addresses:
             ops.append(self._call("outputs", "outputs", fraction, self._outputs if final else (0, 0)))
         return ops
 
-    def latch(self) -> list[Op]:
+    def latch(self) -> list[Operation]:
         """Inputs are read where they lie."""
         return []
 
-    def advance(self) -> list[Op]:
+    def advance(self) -> list[Operation]:
         """Carry the states over the step."""
         return [self._call("advance", "advance", 0.0, (self.state_address, self.n_states))]
 
-    def set_states(self, fraction: float) -> list[Op]:
+    def set_states(self, fraction: float) -> list[Operation]:
         """States are combined where they lie."""
         return []
 
-    def derivatives(self, target: int, fraction: float) -> list[Op]:
+    def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Evaluate the derivatives and copy them to `target`."""
         if not self.n_states:
             return []
-        copy = Op("", COPY, a=self.derivative_address, b=target, n=self.n_states, weights=(1.0, 0.0))
+        copy = Copy(source=self.derivative_address, target=target, count=self.n_states)
         return [self._call("derivatives", "derivatives", fraction), copy]
 
-    def complete(self) -> list[Op]:
+    def complete(self) -> list[Operation]:
         """Nothing happens between steps."""
         return []
 

@@ -12,11 +12,9 @@ sample period at the communication points only.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterable
 from dataclasses import replace
-from itertools import groupby
-from typing import Any, TypeAlias
+from typing import TypeAlias
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -31,16 +29,16 @@ from ..fmi.instance.co_simulation import CoSimulationInstance
 from ..fmi.instance.instance import FMUInstance
 from ..fmi.instance.model_exchange import ModelExchangeInstance
 from ..loop.loop import Loop
-from ..loop.operations import CALL, COMBINE, COPY, GATHER, RECORD, STATISTICS, Op
-from ..loop.signals import EndOfRun, Failures, operation_error
+from ..loop.operations import Combine, Copy, Operation
+from ..loop.signals import EndOfRun, RunSignals, operation_error
 from ..result import SimulationError
 from ..system.evaluation_order import evaluation_order
 from ..system.system import Connection, Port, System, is_block
 from ..system.text_ports import TextPort
 from .coupling.iterated import IteratedCoupling
 from .kernel_instance import KernelInstance, buffer
+from .recorder import Recorder
 
-Table: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 Instance: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInstance
 #: what stage coupling integrates
 Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
@@ -68,37 +66,38 @@ class Program:
     ) -> None:
         self.system = system
         self.h = h
-        self.failures = Failures()
+        self.failures = RunSignals()
         self.instances: dict[str, Instance] = {}
         self._alone: dict[str, str] = {}  # FMUs that can be there once only, by token
         self.buffers: list[Array] = []
-        self.callbacks: list[Any] = []
         self.iteration: IteratedCoupling | None = None
-        self.first: list[Op] = []
-        self.second: list[Op] = []
-        self.recorded = record
-        self.watched = statistics
+        self.first: list[Operation] = []
+        self.second: list[Operation] = []
+        self.recorded, self.watched = record, statistics
+        self.watch: list[Operation] = []
         self.coupling = f"stage coupling, {solver}" if coupling == "continuous" else f"{coupling} coupling"
         stage = coupling == "continuous"
-        #: strings and binary data to record, and what was, a list a port
-        self.recorded_texts: dict[TextPort, list[str | bytes]] = {port: [] for port in texts}
+        texts = list(texts)
         ends = [end for c in system.connections for end in (c.source, c.target)]
         heard = [c.source for c in system.text_connections]
         used = {(p.participant, p.name) for p in [*record, *statistics, *ends]}
-        used |= {(p.participant, p.name) for p in [*self.recorded_texts, *heard]}
+        used |= {(p.participant, p.name) for p in [*texts, *heard]}
         try:
             for name, member in system.participants.items():
                 ports = {port for participant, port in used if participant == name}
                 self.instances[name] = self._instance(name, member, stage, jit, ports)
             self._connect_texts()
+            self.recorder = Recorder(
+                record, statistics, texts, decimation, self.address, self.text, self.failures
+            )
             self.order = system.block_order()
             self.rates = {name: self._rate(name) for name in self.order}
             #: memory of the connections that are one step late, by their index
             self.delays = self._delays()
             if stage:
-                self._stage_coupling(solver, self.delays, decimation)
+                self._stage_coupling(solver, self.delays)
             else:
-                self._sampled_coupling(self.delays, decimation, tolerance if coupling == "iterated" else None)
+                self._sampled_coupling(self.delays, tolerance if coupling == "iterated" else None)
             self.memory = [*self.delays.values(), *(self.iteration.arrays() if self.iteration else [])]
         except BaseException:
             self.close()
@@ -196,6 +195,11 @@ class Program:
         """Return the address of the floats of a port."""
         return self.instances[port.participant].address(port.name) + 8 * port.first
 
+    def text(self, port: TextPort) -> str | bytes:
+        """Return the string or binary data of a port."""
+        text: str | bytes = self._fmu(port.participant).texts[port.name]
+        return text
+
     def _delays(self) -> dict[int, Array]:
         """Return the memory of the connections that are one step late, by their index.
 
@@ -210,42 +214,47 @@ class Program:
 
     def _copies(
         self, name: str, delays: dict[int, Array], every: int = 1, leave: list[Connection] | None = None
-    ) -> list[Op]:
+    ) -> list[Operation]:
         """Return the operations that bring the inputs of a participant, some connections left out."""
-        ops = []
+        ops: list[Operation] = []
         for i, c in enumerate(self.system.connections):
             if c.target.participant == name and c not in (leave or []):
                 source = delays[i].ctypes.data if i in delays else self.address(c.source)
-                ops += self._copy(c, source, every)
+                ops.append(self._copy(c, source, every))
         return ops
 
-    def _copy(self, c: Connection, source: int, every: int) -> list[Op]:
-        target = self.address(c.target)
-        weights = (c.scale, c.offset)
-        op = Op(str(c), COPY, a=source, b=target, n=c.source.count, every=every, weights=weights)
-        if c.source.count == c.target.count:
-            return [op]
-        rest = [replace(op, text="", b=target + 8 * j) for j in range(1, c.target.count)]
-        return [op, *rest]
+    def _copy(self, c: Connection, source: int, every: int) -> Operation:
+        return Copy(
+            text=str(c),
+            source=source,
+            target=self.address(c.target),
+            count=c.target.count,
+            factor=c.scale,
+            offset=c.offset,
+            spread=c.source.count != c.target.count,
+            every=every,
+        )
 
-    def _remember(self, delays: dict[int, Array]) -> list[Op]:
+    def _remember(self, delays: dict[int, Array]) -> list[Operation]:
         """Return the operations that keep the sources of delayed connections for the next step."""
-        ops = []
+        ops: list[Operation] = []
         for i, memory in delays.items():
             source = self.system.connections[i].source
             text = f"keep {source} for the next step"
-            kept = memory[1].ctypes.data
-            ops.append(Op(text, COPY, a=self.address(source), b=kept, n=source.count, weights=(1.0, 0.0)))
+            kept = int(memory[1].ctypes.data)
+            ops.append(Copy(text=text, source=self.address(source), target=kept, count=source.count))
         return ops
 
-    def _release(self, delays: dict[int, Array]) -> list[Op]:
+    def _release(self, delays: dict[int, Array]) -> list[Operation]:
         """Return the operations that turn what was kept into the value of the next step."""
         return [
-            Op("", COPY, a=m[1].ctypes.data, b=m[0].ctypes.data, n=m.shape[1], weights=(1.0, 0.0))
+            Copy(source=int(m[1].ctypes.data), target=int(m[0].ctypes.data), count=m.shape[1])
             for m in delays.values()
         ]
 
-    def _block(self, name: str, delays: dict[int, Array], fraction: float = 0.0, every: int = 1) -> list[Op]:
+    def _block(
+        self, name: str, delays: dict[int, Array], fraction: float = 0.0, every: int = 1
+    ) -> list[Operation]:
         instance = self.instances[name]
         assert not isinstance(instance, ModelExchangeInstance)  # as_block needs Co-Simulation
         acting = instance.step(fraction)
@@ -261,50 +270,13 @@ class Program:
         assert isinstance(instance, FMUInstance)  # texts are ports of FMUs only
         return instance
 
-    def _read_texts(self, name: str) -> list[Op]:
+    def _read_texts(self, name: str) -> list[Operation]:
         instance = self.instances[name]
         return instance.read_texts() if isinstance(instance, FMUInstance) else []
 
-    # ----------------------------------------------------------------- recorded signals
-
-    def _addresses(self, ports: list[Port]) -> Table:
-        """Return the addresses of the single floats of ports."""
-        return np.array([self.address(p) + 8 * i for p in ports for i in range(p.count)], dtype=np.int64)
-
-    def values(self, addresses: Table) -> Array:
-        """Return the floats at addresses."""
-        return np.array([ctypes.c_double.from_address(int(a)).value for a in addresses])
-
-    def _sinks(self, decimation: int) -> list[Op]:
-        """Return the operations that record and keep statistics; `record_to` sets the record buffer."""
-        self.recorded_addresses = self._addresses(self.recorded)
-        self.watched_addresses = self._addresses(self.watched)
-        self.columns, m = len(self.recorded_addresses), len(self.watched_addresses)
-        self.statistics = buffer(4 * m)[: 4 * m].reshape(m, 4)
-        ops = []
-        if self.recorded_texts:
-            guarded = self.failures.guard("record", lambda t, h: self.keep_texts())
-            self.callbacks.append(guarded)
-            address = ctypes.cast(guarded, ctypes.c_void_p).value or 0
-            names = ", ".join(map(str, self.recorded_texts))
-            ops.append(Op(f"record {names} (Python callback)", CALL, address, every=decimation))
-        if m:
-            a, b = int(self.watched_addresses.ctypes.data), int(self.statistics.ctypes.data)
-            ops.append(Op(f"statistics of {_names(self.watched)}", STATISTICS, a=a, b=b, n=m))
-        if self.columns or self.recorded_texts:
-            a = int(self.recorded_addresses.ctypes.data)
-            text = f"record {_names(self.recorded)}" if self.columns else ""
-            ops.append(Op(text, RECORD, a=a, n=self.columns, every=decimation))
-        return ops
-
-    def keep_texts(self) -> None:
-        """Record the strings and binary data of the present point."""
-        for port, rows in self.recorded_texts.items():
-            rows.append(self._fmu(port.participant).texts[port.name])
-
     # ----------------------------------------------------------------- sampled coupling
 
-    def _sampled_coupling(self, delays: dict[int, Array], decimation: int, tolerance: float | None) -> None:
+    def _sampled_coupling(self, delays: dict[int, Array], tolerance: float | None) -> None:
         """Sampled coupling; with a tolerance, what moves and is coupled directly is iterated."""
         moving = [n for n in self.instances if not self._is_block(n)]
         coupled: list[Connection] = []
@@ -318,8 +290,7 @@ class Program:
             self.first += self._read_texts(name)
         for name in self.order:
             self.first += self._block(name, delays, every=self.rates[name] or 1)
-        self.first += self._sinks(decimation)
-        self.first += self._remember(delays)
+        self.watch = [*self.recorder.operations, *self._remember(delays)]
         for name in moving:
             self.second += self._copies(name, delays, leave=coupled)
             self.second += self.instances[name].latch() if name in alone else []
@@ -356,7 +327,7 @@ class Program:
 
     # ------------------------------------------------------------------- stage coupling
 
-    def _stage_coupling(self, solver: str, delays: dict[int, Array], decimation: int) -> None:
+    def _stage_coupling(self, solver: str, delays: dict[int, Array]) -> None:
         nodes, rows, weights = TABLEAUS[solver]
         moving = {n: i for n, i in self.instances.items() if not self._is_block(n)}
         integrated = {n: i for n, i in moving.items() if isinstance(i, Integrated)}
@@ -367,7 +338,7 @@ class Program:
         work = {n: buffer((1 + len(nodes)) * i.n_states) for n, i in integrated.items()}
         self.buffers += work.values()
         for stage, (c, row) in enumerate(zip(nodes, rows, strict=True)):
-            ops: list[Op] = []
+            ops: list[Operation] = []
             for name, instance in integrated.items():
                 if stage > 0:
                     ops += _state_of(instance, work[name], row, f"{name}: states of stage {stage + 1}")
@@ -376,10 +347,11 @@ class Program:
                 ops += [op for name in moving for op in self._read_texts(name)]
             ops += self._evaluation(rounds, delays, c, stage)
             if stage == 0:
-                self.first = [*ops, *self._sinks(decimation), *self._remember(delays)]
+                self.first, self.watch = ops, [*self.recorder.operations, *self._remember(delays)]
                 for name, instance in integrated.items():
-                    save = Op("", COPY, a=instance.state_address, n=instance.n_states, weights=(1.0, 0.0))
-                    self.second.append(replace(save, b=int(work[name].ctypes.data)))
+                    kept = int(work[name].ctypes.data)
+                    save = Copy(source=instance.state_address, target=kept, count=instance.n_states)
+                    self.second.append(save)
             else:
                 self.second += ops
             for name, instance in integrated.items():
@@ -391,14 +363,14 @@ class Program:
             self.second += [*instance.set_states(1.0), *instance.complete()]
         self.second += self._release(delays)
 
-    def _with_inputs(self, name: str, delays: dict[int, Array]) -> list[Op]:
+    def _with_inputs(self, name: str, delays: dict[int, Array]) -> list[Operation]:
         return [*self._copies(name, delays), *self.instances[name].latch()]
 
     def _evaluation(
         self, rounds: list[dict[str, bool]], delays: dict[int, Array], c: float, stage: int
-    ) -> list[Op]:
+    ) -> list[Operation]:
         """Return one evaluation of all outputs and blocks at a stage."""
-        ops: list[Op] = []
+        ops: list[Operation] = []
         for i, members in enumerate(rounds):
             for name, feedthrough in members.items():
                 if not self._is_block(name):
@@ -424,30 +396,17 @@ class Program:
 
     def loop(self) -> Loop:
         """Return the loop, compiled."""
-        return Loop(self._merged(self.first), self._merged(self.second), self.failures.stop)
-
-    def _merged(self, ops: list[Op]) -> list[Op]:
-        """Join neighbouring copies of a few floats to one operation: less to look up for the loop."""
-        merged: list[Op] = []
-        for plain, group in groupby(ops, key=_copied_as_is):
-            if plain == 0:
-                merged += group
-                continue
-            pairs = [(op.a + 8 * i, op.b + 8 * i) for op in group for i in range(op.n)]
-            table = np.array(pairs, dtype=np.int64)
-            self.buffers.append(table)  # type: ignore[arg-type]
-            merged.append(Op("", GATHER, a=int(table.ctypes.data), n=len(pairs), every=plain))
-        return merged
+        return Loop(self.first, self.watch, self.second, self.failures.stop)
 
     def run_once(self, loop: Loop, t0: float, k: int) -> None:
         """Run operations of a loop of their own once, at t_k = t0 + k h; raise what ends the run."""
         if loop.run(k, k + 1, k, t0, self.h):
             if isinstance(self.failures.exception, (EndOfRun, KeyboardInterrupt)):
                 raise self.failures.exception
-            row, _, status = (int(x) for x in loop.report[:3])
-            raise self.error(loop.rows[row], t0, k, status)
+            row, _, status = (int(x) for x in loop.report)
+            raise self.error(loop.operations[row], t0, k, status)
 
-    def error(self, op: Op, start: float, k: int, status: int) -> SimulationError:
+    def error(self, op: Operation, start: float, k: int, status: int) -> SimulationError:
         """Return what it means that an operation failed at point k with a status."""
         if self.failures.exception is not None:
             return self.failures.error()
@@ -459,24 +418,22 @@ class Program:
     def schedule(self) -> str:
         """Return the schedule of one communication step, a line an operation."""
 
-        def lines(ops: list[Op]) -> list[str]:
-            rated = ((op, f" (every {op.every})" if op.every > 1 else "") for op in ops if op.text)
-            return [f"  {op.text}{rate}" for op, rate in rated]
+        def lines(ops: list[Operation]) -> list[str]:
+            return [f"  {op.line()}" for op in ops if op.text]
 
-        return "\n".join([self.coupling, "at t_k:", *lines(self.first), "to t_k+1:", *lines(self.second)])
-
-
-def _copied_as_is(op: Op) -> int:
-    """Return the rate of an operation that copies a few floats without a factor, 0 for another one."""
-    return op.every if op.code == COPY and op.n <= 8 and op.weights == (1.0, 0.0) else 0
+        act = [*self.first, *self.watch]
+        return "\n".join([self.coupling, "at t_k:", *lines(act), "to t_k+1:", *lines(self.second)])
 
 
-def _state_of(instance: Integrated, work: Array, weights: tuple[float, ...], text: str) -> list[Op]:
-    n, a = instance.n_states, int(work.ctypes.data)
-    b, c = a + 8 * n, instance.state_address
-    op = Op(text, COMBINE, a=a, b=b, c=c, n=n, weights=weights, participant=instance.name)
+def _state_of(instance: Integrated, work: Array, weights: tuple[float, ...], text: str) -> list[Operation]:
+    n, start = instance.n_states, int(work.ctypes.data)
+    op = Combine(
+        text=text,
+        start=start,
+        slopes=start + 8 * n,
+        result=instance.state_address,
+        count=n,
+        weights=weights,
+        participant=instance.name,
+    )
     return [op] if n else []
-
-
-def _names(ports: list[Port]) -> str:
-    return ", ".join(map(str, ports))

@@ -14,8 +14,6 @@ communication point is in program.py, and `Result.schedule` shows it for the run
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -23,15 +21,13 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
 from ..core.time_grid import steps_between
 from ..core.variables import Array
-from ..errors import RecordError, SimulationEndedWarning, SnapshotError, TimeError
+from ..errors import SimulationEndedWarning, SnapshotError, TimeError
 from ..fmi.instance.instance import FMUInstance
 from ..loop.loop import Loop
 from ..loop.signals import EndOfRun, ctrl_c
-from ..result import Interrupted, Result, SimulationError, Statistics
+from ..result import Interrupted, Result, SimulationError
 from ..system.system import System
 from .plan import (
     Coupling,
@@ -45,9 +41,6 @@ from .plan import (
     text_ports,
 )
 from .program import Program
-
-#: recorded signals above this many bytes go to a temporary file
-MEMORY_LIMIT = 200_000_000
 
 
 @dataclass(frozen=True)
@@ -120,7 +113,6 @@ class Simulation:
         self._ended = ""
         self._token = object()
         self._first = 0
-        self._data: Array = np.empty((0, 0))
         self._began = 0.0
         self._last: Result | None = None
 
@@ -174,7 +166,8 @@ class Simulation:
         with ctrl_c(self._program.failures):
             self._check_usable("run")
             loop = self._begun()
-            self._open_records(loop, last)
+            self._first = self._k
+            self._program.recorder.open(self._k, last)
             self._last = self._run(loop, last, progress)
             return self._last
 
@@ -184,7 +177,6 @@ class Simulation:
             self._incomplete = True
             self._began = time.perf_counter()
             self._loop = self._program.loop()
-            self._data = np.empty((0, self._program.columns))
             try:
                 self._program.start(self.start)
             except SimulationError as error:
@@ -196,42 +188,6 @@ class Simulation:
             self._incomplete = False
         return self._loop
 
-    def _open_records(self, loop: Loop, last: int) -> None:
-        """Make room for what is recorded from here on; the present point is the first if it was computed."""
-        program = self._program
-        self._data = self._room(last)
-        self._first = self._k
-        loop.record_to(self._data)
-        loop.report[:] = 0
-        program.statistics[:] = np.inf, -np.inf, 0.0, 0.0
-        for texts in program.recorded_texts.values():
-            texts.clear()
-        if self._acted:
-            x = program.values(program.watched_addresses)
-            if len(x):
-                program.statistics[:] = np.column_stack([x, x, x, x * x])
-            loop.report[4] = 1
-            if self._k % self.decimation == 0 and (program.columns or program.recorded_texts):
-                self._data[0] = program.values(program.recorded_addresses)
-                program.keep_texts()
-                loop.report[3] = 1
-
-    def _room(self, last: int) -> Array:
-        rows = last // self.decimation - -(-self._k // self.decimation) + 1
-        columns = self._program.columns
-        size = rows * columns * 8
-        if size <= MEMORY_LIMIT:
-            return np.empty((rows, columns))
-        folder = tempfile.gettempdir()
-        free = shutil.disk_usage(folder).free
-        if size > free:
-            raise RecordError(
-                f"{columns} numbers at {rows} points take {size / 1e9:.3g} GB and {folder} has "
-                f"{free / 1e9:.3g} GB free; record fewer ports (record=[...]), or with decimation="
-            )
-        file = tempfile.TemporaryFile(prefix="structcosim-")  # noqa: SIM115  lives as long as the arrays
-        return np.memmap(file, dtype=np.float64, mode="w+", shape=(rows, columns))
-
     def _run(self, loop: Loop, last: int, progress: Callable[[int, int], None] | None) -> Result:
         failures = self._program.failures
         self._began = time.perf_counter()
@@ -242,13 +198,13 @@ class Simulation:
                 before = time.perf_counter()
                 self._incomplete = True  # until the loop is back
                 if loop.run(self._k, until, last, self.start, self.step, self._acted):
-                    row, self._k, status = (int(x) for x in loop.report[:3])
+                    row, self._k, status = (int(x) for x in loop.report)
                     self._acted = False
                     if isinstance(failures.exception, KeyboardInterrupt):
                         raise failures.exception
                     if isinstance(failures.exception, EndOfRun):
                         return self._end(failures.exception.text)
-                    raise self._program.error(loop.rows[row], self.start, self._k, status)
+                    raise self._program.error(loop.operations[row], self.start, self._k, status)
                 self._k = int(loop.report[1])
                 self._acted = self._k < until  # the last point, or where a participant asked to end
                 if failures.end and self._acted:
@@ -381,22 +337,8 @@ class Simulation:
 
     def _result(self, interrupted: bool = False) -> Result:
         program = self._program
-        assert self._loop is not None
-        rows, sampled = (int(n) for n in self._loop.report[3:])
-        signals: dict[str, Array] = {}
-        column = 0
-        for port in program.recorded:
-            part = self._data[:rows, column : column + port.count]
-            signals[str(port)] = part[:, 0] if port.shape == () or port.count == 1 else part
-            column += port.count
-        first = -(-self._first // self.decimation)
-        k = (first + np.arange(rows, dtype=np.float64)) * self.decimation
         return Result(
-            time=self.start + k * self.step,
-            signals=signals,
-            units={str(p): p.unit for p in [*program.recorded, *program.watched]},
-            texts={str(port): texts[:rows] for port, texts in program.recorded_texts.items()},
-            statistics=self._statistics(sampled),
+            **program.recorder.recording(self.start, self.step),
             step=self.step,
             steps=self._k - self._first,
             seconds=time.perf_counter() - self._began,
@@ -404,17 +346,3 @@ class Simulation:
             interrupted=interrupted,
             ended=self._ended,
         )
-
-    def _statistics(self, n: int) -> dict[str, Statistics]:
-        found: dict[str, Statistics] = {}
-        if n == 0:
-            return found
-        row = 0
-        for port in self._program.watched:
-            low, high, total, squares = self._program.statistics[row : row + port.count].T.copy()
-            row += port.count
-            values: list[Any] = [low, high, total / n, np.sqrt(squares / n), np.sqrt(squares)]
-            if port.shape == () or port.count == 1:
-                values = [float(v[0]) for v in values]
-            found[str(port)] = Statistics(*values)
-        return found

@@ -37,7 +37,7 @@ from ...codegen.c_compiler import (
 )
 from ...codegen.kernels import cache_directory
 from ...errors import CompilationError, FMUError
-from ...loop.signals import Failures
+from ...loop.signals import RunSignals
 
 _SOURCES = Path(__file__).parent / "c"
 _HOST = Path(__file__).parent / "isolated_host.py"
@@ -92,7 +92,7 @@ class Isolation:
     Raises FMUError where the library cannot be loaded.
     """
 
-    def __init__(self, name: str, library: Path, failures: Failures) -> None:
+    def __init__(self, name: str, library: Path, failures: RunSignals) -> None:
         self.name = name
         self.failures = failures
         #: how the process ended when it should not have, or ""

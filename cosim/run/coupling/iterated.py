@@ -24,8 +24,8 @@ from ...errors import WiringError
 from ...fmi.instance.co_simulation import CoSimulationInstance
 from ...fmi.instance.model_exchange import ModelExchangeInstance
 from ...loop.loop import Loop
-from ...loop.operations import CALL, Op
-from ...loop.signals import EndOfRun, Failures
+from ...loop.operations import Call, Operation
+from ...loop.signals import EndOfRun, RunSignals
 from ...result import SimulationError
 from ...system.system import Connection, Port
 from ..kernel_instance import KernelInstance
@@ -44,7 +44,7 @@ class IteratedCoupling:
         tolerance: float,
         address: Callable[[Port], int],
         run_once: Callable[[Loop, float, int], None],
-        failures: Failures,
+        failures: RunSignals,
     ) -> None:
         """Take the members by name, the connections between them, and the program's services.
 
@@ -80,16 +80,15 @@ class IteratedCoupling:
         self._w, self._before = np.full((2, n), np.nan)
         self._t0 = 0.0
         self._loops: tuple[Loop, Loop] | None = None
-        self._callback = failures.guard(self.members[0], self._step)
+        self._callback = failures.callback(self.members[0], self._step)
 
-    def operation(self) -> Op:
+    def operation(self) -> Operation:
         """Return the operation that moves the members from t_k to t_{k+1}."""
-        address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
         text = (
             f"{', '.join(self.members)}: step, repeated until {', '.join(map(str, self._sources))} "
             f"agree at t_k+1 to {self._solver.tolerance:g} (Python callback)"
         )
-        return Op(text, CALL, address, participant=self.members[0])
+        return Call(text=text, function=self._callback, participant=self.members[0])
 
     def arrays(self) -> list[Array]:
         """Return the memory that belongs to the state of a simulation."""
@@ -101,10 +100,10 @@ class IteratedCoupling:
         every = list(self._instances.values())
         latch = [op for i in every for op in i.latch()]
         stop = self._failures.stop
-        look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [], stop)
+        look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [], [], stop)
         after = [op for i in every for op in i.read(1.0)]
-        move = Loop([*latch, *(op for i in every for op in i.advance())], [], stop)
-        self._loops = move, Loop([*latch, *after], [], stop)
+        move = Loop([*latch, *(op for i in every for op in i.advance())], [], [], stop)
+        self._loops = move, Loop([*latch, *after], [], [], stop)
 
         def g(w: Array) -> Array:
             self._hold(w)
