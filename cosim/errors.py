@@ -47,10 +47,10 @@ class SimulationEndedWarning(UserWarning):
 
 
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:
-    """Return "; did you mean 'x'? (candidates)" for an unknown name."""
+    """Return "; did you mean 'x'? (available: ...)" for an unknown name."""
     known = list(candidates)
     lowered = {k.lower(): k for k in known}
     close = get_close_matches(str(name).lower(), lowered, n=1, cutoff=0.6)
     hint = f"; did you mean '{lowered[close[0]]}'?" if close else ""
     shown = ", ".join(known[:20]) + (f", ... ({len(known)} in all)" if len(known) > 20 else "")
-    return f"{hint} (there are: {shown or 'none'})"
+    return f"{hint} (available: {shown or 'none'})"

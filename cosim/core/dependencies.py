@@ -16,10 +16,9 @@ import textwrap
 import types
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from .participant import Participant
+from .participant import Participant
 
 _EVALUATION = ("derivatives", "outputs", "step")
 _VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}

@@ -24,6 +24,7 @@ import numpy as np
 
 from ..errors import DeclarationError, did_you_mean
 from ..functions import integrate_ode4, linear_hold
+from .port import Direction, Port
 from .variables import KINDS, Array, Local, Parameter, Variable
 
 #: kernels, and how many of (t, h) each takes
@@ -72,6 +73,10 @@ class Participant:
     KERNELS: ClassVar[tuple[str, ...]] = ()
     #: False: the kernels contain Python that Numba cannot compile; they are called back
     compiled: ClassVar[bool] = True
+    #: see component.py, whose contract every participant keeps
+    as_block: bool = False
+    every: int | None = None
+    sample_period: float | None = None
     _declared: ClassVar[dict[str, Variable]] = {}
 
     input_vector: Array
@@ -265,18 +270,28 @@ class Participant:
         for name, value in attributes.items():
             setattr(self, name, _copied(value))
 
+    # ------------------------------------------------------------------- ports
+
+    def ports(self, direction: Direction) -> dict[str, Port]:
+        """Return the inputs, or the outputs and states, as ports."""
+        kinds = ("input",) if direction == "input" else ("output", "state")
+        return {
+            name: Port("", name, v.shape, v.unit, count=v.size)  # type: ignore[arg-type]
+            for name, v in self.variables.items()
+            if v.kind in kinds
+        }
+
+    @property
+    def declared_outputs(self) -> list[str]:
+        """The names of the outputs and states."""
+        return list(self.ports("output"))
+
     # ----------------------------------------------------------------- kernels
 
     @property
     def kernels(self) -> dict[str, Callable[..., None]]:
         """The kernels that this class has, by name."""
         return {name: getattr(type(self), name) for name in self.KERNELS if hasattr(type(self), name)}
-
-    def dependencies(self) -> dict[str, set[str]]:
-        """Which inputs and states each output and derivative depends on (a superset, by variable)."""
-        from .dependencies import dependencies
-
-        return dependencies(self)
 
     def __repr__(self) -> str:
         shown = ", ".join(
@@ -300,9 +315,7 @@ class Block(Participant):
     """
 
     KERNELS = ("initialize", "step")
-
-    every: int | None
-    sample_period: float | None
+    as_block = True
 
     def __init__(
         self, *, every: int | None = None, sample_period: float | None = None, **values: Any

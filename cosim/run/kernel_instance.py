@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..codegen.kernels import kernel_addresses
+from ..core.dependencies import dependencies
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from ..core.variables import Array
 from ..errors import CompilationError, DeclarationError
@@ -185,7 +186,7 @@ class KernelInstance:
         """Return, for every output, the inputs on which it depends directly."""
         inputs = {n for n, v in self.participant.variables.items() if v.kind == "input"}
         kinds = {n: v.kind for n, v in self.participant.variables.items()}
-        found = {n: d & inputs for n, d in self.participant.dependencies().items() if kinds[n] == "output"}
+        found = {n: d & inputs for n, d in dependencies(self.participant).items() if kinds[n] == "output"}
         return found | {n: set() for n, kind in kinds.items() if kind == "state"}
 
     def locate(self, slot_address: int) -> str:

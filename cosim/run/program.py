@@ -19,7 +19,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ..core.participant import Block, Continuous
+from ..core.participant import Continuous
+from ..core.port import Port
 from ..core.tableaus import TABLEAUS
 from ..core.time_grid import steps_between
 from ..core.variables import Array
@@ -33,8 +34,7 @@ from ..loop.operations import Combine, Copy, Operation
 from ..loop.signals import EndOfRun, RunSignals, operation_error
 from ..result import SimulationError
 from ..system.evaluation_order import evaluation_order
-from ..system.system import Connection, Port, System, is_block
-from ..system.text_ports import TextPort
+from ..system.system import Connection, System
 from .coupling.iterated import IteratedCoupling
 from .kernel_instance import KernelInstance, buffer
 from .recorder import Recorder
@@ -62,7 +62,7 @@ class Program:
         decimation: int,
         jit: bool,
         tolerance: float = 1e-8,
-        texts: Iterable[TextPort] = (),
+        texts: Iterable[Port] = (),
     ) -> None:
         self.system = system
         self.h = h
@@ -174,7 +174,6 @@ class Program:
     def _rate(self, name: str) -> int | None:
         """Return every how many steps a block acts; None when it follows the coupling."""
         block = self.system.participants[name]
-        assert isinstance(block, (Block, FMU))
         if block.sample_period is not None:
             return steps_between(block.sample_period, self.h, f"{name}: sample period")
         return block.every
@@ -187,7 +186,7 @@ class Program:
         return crashes
 
     def _is_block(self, name: str) -> bool:
-        return is_block(self.system.participants[name])
+        return self.system.participants[name].as_block
 
     # --------------------------------------------------------------------- connections
 
@@ -195,7 +194,7 @@ class Program:
         """Return the address of the floats of a port."""
         return self.instances[port.participant].address(port.name) + 8 * port.first
 
-    def text(self, port: TextPort) -> str | bytes:
+    def text(self, port: Port) -> str | bytes:
         """Return the string or binary data of a port."""
         text: str | bytes = self._fmu(port.participant).texts[port.name]
         return text

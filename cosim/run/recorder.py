@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from ..core.port import Port
 from ..core.variables import Array
 from ..errors import RecordError
 from ..loop.operations import Call, Operation, Record, Sample
 from ..loop.signals import RunSignals
 from ..result import Statistics
-from ..system.system import Port
-from ..system.text_ports import TextPort
 
 #: recorded signals above this number of bytes go to a temporary file
 MEMORY_LIMIT = 200_000_000
@@ -34,10 +33,10 @@ class Recorder:
         self,
         recorded: Sequence[Port],
         watched: Sequence[Port],
-        texts: Sequence[TextPort],
+        texts: Sequence[Port],
         decimation: int,
         address: Callable[[Port], int],
-        text: Callable[[TextPort], str | bytes],
+        text: Callable[[Port], str | bytes],
         signals: RunSignals,
     ) -> None:
         """Take the ports, and the functions that return the address of the floats and the text of a port."""

@@ -388,5 +388,5 @@ def test_values_that_do_not_fit_are_refused(values, words):
 def test_what_is_no_participant_is_refused():
     with pytest.raises(WiringError, match=r"'control' is .* give Gain\(\.\.\.\)"):
         System({"control": Gain})
-    with pytest.raises(WiringError, match="no participant"):
+    with pytest.raises(WiringError, match="cannot take part in a system"):
         System({"control": 3.0})
