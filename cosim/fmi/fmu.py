@@ -159,6 +159,12 @@ class FMU:
                 )
         self.start_values()
 
+    def instance(self, name: str, setting: Any) -> Any:
+        """Return a running instance (cosim/run/instance.py); refuse a setting that the FMU does not fit."""
+        from .instance.making import instance_of
+
+        return instance_of(name, self, setting)
+
     def ports(self, direction: Direction) -> dict[str, Port]:
         """Return the inputs with their aliases, or the outputs and local variables, as ports."""
         return self.inputs if direction == "input" else self.outputs

@@ -8,9 +8,9 @@ compiled once per process, in hundredths of a second and without Numba.
 
 runs the points k0 <= k < k1 of a system whose last point is `last`, in three parts:
 
-    act     at every point: evaluate it
-    watch   at every point: record it
-    carry   at every point but the last: move on to the next one
+    at_point    at every point: evaluate it
+    recording   at every point: record it
+    to_next     at every point but the last: move on to the next one
 
 With `resume` the point k0 has been evaluated already, at the end of the run that is
 resumed: it is recorded again, as the first point of this run. When a callback has set
@@ -77,7 +77,7 @@ begin:
   %kf = sitofp i64 %k to double
   %start = icmp eq i64 %k, %k0
   %skip = and i1 %start, %resumes
-  br i1 %skip, label %watch, label %act"""
+  br i1 %skip, label %recording, label %at_point"""
 
 _TAIL = """nextpoint:
   %knext = add i64 %k, 1
@@ -107,14 +107,14 @@ class Loop:
 
     def __init__(
         self,
-        act: Sequence[Operation],
-        watch: Sequence[Operation],
-        carry: Sequence[Operation],
+        at_point: Sequence[Operation],
+        recording: Sequence[Operation],
+        to_next: Sequence[Operation],
         stop: np.ndarray[Any, np.dtype[np.int64]],
     ) -> None:
         """Take the operations of each part, and the (1,) `stop` that makes the next point the last."""
         self._pairs: list[Any] = []  # the tables of Gather
-        parts = [self._gathered(part) for part in (act, watch, carry)]
+        parts = [self._gathered(part) for part in (at_point, recording, to_next)]
         self.operations = [op for part in parts for op in part]
         self.report = np.zeros(3, dtype=np.int64)
         self._stop = stop
@@ -147,24 +147,23 @@ def _gathered_every(op: Operation) -> int:
     return op.every if isinstance(op, Copy) and op.is_plain and op.count <= INLINE else 0
 
 
-def loop_ir(act: list[Operation], watch: list[Operation], carry: list[Operation]) -> str:
+def loop_ir(*parts: list[Operation]) -> str:
     """Return the loop of a system as LLVM IR; the text is the same for systems of one shape."""
     w = Writer()
-    operations = iter(enumerate([*act, *watch, *carry]))
     place = 0
-    for name, part in (("act", act), ("watch", watch), ("carry", carry)):
-        if name == "watch":
-            w.go_to("watch")
-        elif name == "carry":
+    for name, part in zip(("at_point", "recording", "to_next"), parts, strict=True):
+        if name == "recording":
+            w.go_to("recording")
+        elif name == "to_next":
             w.write("%stopped = load i64, ptr %stop\n  %runs = icmp eq i64 %stopped, 0")
             w.write("%before = icmp slt i64 %k, %last\n  %more = and i1 %before, %runs")
-            w.branch("%more", "carry", "done")
+            w.branch("%more", "to_next", "done")
         w.start_block(name)
-        for _ in part:
-            w.row, op = next(operations)
+        for op in part:
             w.places = {name: place + i for i, name in enumerate(op.addresses())}
             place += len(w.places)
             _emit(w, op)
+            w.row += 1
     w.go_to("nextpoint")
     w.lines.append(_TAIL)
     if w.exits:

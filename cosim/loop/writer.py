@@ -26,7 +26,7 @@ class Writer:
         self.exits: list[tuple[str, int, str]] = []
         self.library: dict[str, str] = {}
         #: the block that is being written
-        self.block = "act"
+        self.block = ""
         #: blocks at which the operations after an UnlessEvent and its End go on
         self.ends: list[str] = []
         #: the current operation: its number, and the places of its addresses in the table

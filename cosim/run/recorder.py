@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..errors import RecordError
 from ..loop.operations import Call, Operation, Record, Sample
 from ..loop.signals import RunSignals
 from ..result import Statistics
+from .binding import Binding
 
 #: recorded signals above this number of bytes go to a temporary file
 MEMORY_LIMIT = 200_000_000
@@ -33,25 +34,24 @@ class Recorder:
         self,
         recorded: Sequence[Port],
         watched: Sequence[Port],
-        texts: Sequence[Port],
         decimation: int,
-        address: Callable[[Port], int],
-        text: Callable[[Port], str | bytes],
+        binding: Binding,
         signals: RunSignals,
     ) -> None:
-        """Take the ports, and the functions that return the address of the floats and the text of a port."""
-        self.recorded, self.watched, self.decimation = recorded, watched, decimation
+        texts = [port for port in recorded if port.kind != "number"]
+        self.recorded, self.watched = [p for p in recorded if p.kind == "number"], watched
+        self.decimation = decimation
         self.texts: dict[str, list[str | bytes]] = {str(port): [] for port in texts}
         self._place = np.zeros(2, dtype=np.int64)  # address of the rows, number of rows so far
         self._first = 0  # the point at which the first row lies, over the decimation
-        self._recorded, self._watched = _addresses(recorded, address), _addresses(watched, address)
+        self._recorded, self._watched = (_addresses(ports, binding) for ports in (self.recorded, watched))
         self._rows: Array = np.empty((0, len(self._recorded)))
         self._kept = np.zeros((max(len(self._watched), 1), 4))
         self._points = np.zeros(1, dtype=np.int64)
 
         def keep_texts(t: float, h: float) -> None:
             for port in texts:
-                self.texts[str(port)].append(text(port))
+                self.texts[str(port)].append(binding.text(port))
 
         #: the operations that record a point
         self.operations: list[Operation] = []
@@ -70,7 +70,7 @@ class Recorder:
             self.operations.append(sample)
         if len(self._recorded) or texts:
             record = Record(
-                text=f"record {', '.join(map(str, recorded))}" if len(self._recorded) else "",
+                text=f"record {', '.join(map(str, self.recorded))}" if len(self._recorded) else "",
                 sources=int(self._recorded.ctypes.data),
                 place=int(self._place.ctypes.data),
                 count=len(self._recorded),
@@ -113,9 +113,9 @@ class Recorder:
         return found
 
 
-def _addresses(ports: Sequence[Port], address: Callable[[Port], int]) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _addresses(ports: Sequence[Port], binding: Binding) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return the address of every single float of ports."""
-    return np.array([address(p) + 8 * i for p in ports for i in range(p.count)], dtype=np.int64)
+    return np.array([binding.address(p) + 8 * i for p in ports for i in range(p.count)], dtype=np.int64)
 
 
 def _parts(ports: Iterable[Port]) -> Iterator[tuple[Port, slice, bool]]:

@@ -18,7 +18,7 @@ from ...loop.conversions import FromFloat, ToFloat
 from ...loop.numbers import Number
 from ...loop.operations import Call, Operation
 from ...loop.signals import RunSignals, ctrl_c
-from ...run.kernel_instance import buffer
+from ...run.instance import buffer
 from ..fmu import FMU
 from ..ports import FMUPort
 
@@ -85,8 +85,8 @@ class FMUInstance:
         self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}
         self.told_texts: dict[str, Any] = {}
         #: where those of inputs come from
-        self.text_sources: dict[str, tuple[FMUInstance, str]] = {}
-        self.has_outputs = bool(self.outputs)
+        self.text_sources: dict[str, tuple[Any, str]] = {}
+        self.is_ended = False
 
     def _exchanges(self, ports: dict[str, FMUPort]) -> list[Exchange]:
         groups: dict[tuple[str, Number, bool, frozenset[int]], list[FMUPort]] = {}
@@ -125,6 +125,7 @@ class FMUInstance:
 
     def stop(self) -> str:
         """Terminate and free the instance; return how it crashed in that, if it is isolated and did."""
+        self.is_ended = True
         before = self.fmi.crash()
         with ctrl_c(self.failures):
             self._end()
@@ -155,6 +156,23 @@ class FMUInstance:
     def can_serialise(self) -> bool:
         """Tell whether the FMU can give its state as bytes."""
         return bool(self.can_save and self.fmi.interface.canSerializeFMUstate)
+
+    @property
+    def is_gone(self) -> bool:
+        """Tell whether the process that it ran in has ended."""
+        return self.fmi.is_gone
+
+    @property
+    def unrepeatable(self) -> str:
+        """Why a step cannot be undone and repeated; "" if it can."""
+        if self.fmu.clocks:
+            return "clocks would tick at every repetition of a step"
+        if not self.can_save:
+            return (
+                "it cannot get and set its state (canGetAndSetFMUState), which the repetition of a step "
+                "needs; export it with that capability"
+            )
+        return ""
 
     def kind(self) -> tuple[Any, ...]:
         """Return what another instance has to share to take back what this one saves."""

@@ -20,7 +20,7 @@ from ...errors import CosimError
 from ...loop.fmi_operations import CompletedStep, End, SetTime, UnlessEvent, Vector
 from ...loop.operations import SLACK, Call, Combine, Copy, Operation
 from ...loop.signals import RunSignals
-from ...run.kernel_instance import buffer
+from ...run.instance import buffer
 from ..fmu import FMU
 from .continuous_time import ContinuousTime
 from .event_steps import EventSteps, RungeKutta
