@@ -17,6 +17,7 @@ from .errors import (
     DeclarationError,
     FMUError,
     LateEventWarning,
+    OptionError,
     RecordError,
     SimulationEndedWarning,
     SnapshotError,
@@ -28,9 +29,8 @@ from .fmi.fmu import FMU
 from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
 from .ground_motion.ground_motion import G
 from .result import Interrupted, Result, SimulationError, Statistics
-from .run.master import schedule, simulate
 from .run.plan import Coupling, Solver
-from .run.simulation import Simulation, Snapshot
+from .run.simulation import Simulation, Snapshot, schedule, simulate
 from .ssp.format import SSPError
 from .ssp.reader import read_ssp
 from .system.system import Connection, System
@@ -57,6 +57,7 @@ __all__ = [
     "LateEventWarning",
     "LinearContinuous",
     "Local",
+    "OptionError",
     "Output",
     "Parameter",
     "Participant",

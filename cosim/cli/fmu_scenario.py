@@ -15,7 +15,7 @@ from ..errors import FMUError, TimeError, did_you_mean
 from ..fmi.file.display_units import has_unit
 from ..fmi.fmu import FMU, Interface, Solver
 from ..result import Result
-from ..run.master import simulate
+from ..run.simulation import simulate
 from ..system.system import System
 from .input_table import connect_inputs, start_from_inputs
 from .scenario import Scenario

@@ -23,7 +23,7 @@ from ..core.participant import Participant, rate
 from ..core.port import Direction, Port
 from ..core.tableaus import TABLEAUS
 from ..errors import FMUError, did_you_mean
-from ..loop.operations import Number
+from ..loop.numbers import Number
 from .clocks import clocks_of
 from .file.archive import Archive
 from .file.display_units import without_units
@@ -158,6 +158,12 @@ class FMU:
                     f"{self.path.name} has no variable '{name}'" + did_you_mean(name, self.variables)
                 )
         self.start_values()
+
+    def instance(self, name: str, setting: Any) -> Any:
+        """Return a running instance (cosim/run/instance.py); refuse a setting that the FMU does not fit."""
+        from .instance.making import instance_of
+
+        return instance_of(name, self, setting)
 
     def ports(self, direction: Direction) -> dict[str, Port]:
         """Return the inputs with their aliases, or the outputs and local variables, as ports."""

@@ -18,8 +18,9 @@ import numpy as np
 
 from ...core.variables import Array
 from ...errors import FMUError
-from ...loop.operations import Number
-from ...loop.signals import Failures, ctrl_c
+from ...loop.fmi_operations import FMI2Values
+from ...loop.numbers import Number
+from ...loop.signals import RunSignals, ctrl_c
 from ...result import SimulationError
 from ..file.shared_library import check_library, library_name
 from ..isolation.isolation import Isolation, support_library
@@ -74,12 +75,10 @@ class Adapter(ABC):
     NUMBERS: ClassVar[dict[str, tuple[str, Number]]]
     DERIVATIVES: ClassVar[str]
     #: operations of the loop, and the type of the flags that functions return
-    VALUES: ClassVar[int]
-    DO_STEP: ClassVar[int]
-    COMPLETED: ClassVar[int]
+    VALUES: ClassVar[type[FMI2Values]]
     FLAG: ClassVar[str]
 
-    def __init__(self, fmu: FMU, name: str, model_exchange: bool, failures: Failures) -> None:
+    def __init__(self, fmu: FMU, name: str, model_exchange: bool, failures: RunSignals) -> None:
         self.fmu = fmu
         self.name = name
         self.messages: list[str] = []
@@ -104,7 +103,7 @@ class Adapter(ABC):
             self.close()
             raise
 
-    def _load(self, library: Path, failures: Failures) -> None:
+    def _load(self, library: Path, failures: RunSignals) -> None:
         identifier = self.interface.modelIdentifier
         try:
             if self.fmu.isolated:

@@ -8,13 +8,13 @@ the loop enters only when there is something to do.
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import replace
 from typing import Any
 
 from ...errors import FMUError
-from ...loop.operations import SLACK, Op
-from ...loop.signals import Failures
+from ...loop.fmi_operations import FMI2DoStep, FMI3DoStep
+from ...loop.operations import SLACK, Operation
+from ...loop.signals import RunSignals
 from ...result import SimulationError
 from ..clocks import Timers
 from ..fmu import FMU
@@ -27,11 +27,10 @@ _DISCARD = 2
 class CoSimulationInstance(EventInstance):
     """One instance of an FMU in a run, with Co-Simulation."""
 
-    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str], h: float) -> None:
+    def __init__(self, name: str, fmu: FMU, failures: RunSignals, used: set[str], h: float) -> None:
         super().__init__(name, fmu, failures, used)
         self._timers = Timers(self.fmi, fmu.clocks.values(), h)
         self.event_mode = fmu.event_mode
-        self.step_callback: Any = None
         if self.fmi.answer is not None:
             self.event_time = self.fmi.answer.event_time
 
@@ -47,24 +46,23 @@ class CoSimulationInstance(EventInstance):
     def _due(self, t: float) -> list[int]:
         return self._timers.due(t)
 
-    def step(self, fraction: float = 0.0) -> list[Op]:
+    def step(self, fraction: float = 0.0) -> list[Operation]:
         """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
         stepped = (replace(op, fraction=fraction) for op in self.advance())
         read = [*self.read(), *self.read_texts()]
         return [*self.latch(), *stepped, *(replace(op, text="") for op in read)]
 
-    def advance(self) -> list[Op]:
+    def advance(self) -> list[Operation]:
         """Do the step."""
-        function = self._function(f"{self.fmi.PREFIX}DoStep")
-        op = Op(f"{self.name}: step (FMU)", self.fmi.DO_STEP, function, self._component)
+        name, function = self.name, self._function(f"{self.fmi.PREFIX}DoStep")
+        common: dict[str, Any] = {"text": f"{name}: step (FMU)", "participant": name, "function": function}
+        common["component"] = self._component
         answer = self.fmi.answer
         if answer is None:
-            self.step_callback = self.failures.guard(self.name, self._discarded)
-        else:
-            op = replace(op, b=int(answer.flags.ctypes.data), c=int(answer.times.ctypes.data))
-            self.step_callback = self.failures.guard(self.name, lambda t, h: self._finish_step(answer, t, h))
-        callback = ctypes.cast(self.step_callback, ctypes.c_void_p).value or 0
-        return [replace(op, d=callback, participant=self.name)]
+            return [FMI2DoStep(discarded=self.failures.callback(name, self._discarded), **common)]
+        flags, times = int(answer.flags.ctypes.data), int(answer.times.ctypes.data)
+        finish = self.failures.callback(name, lambda t, h: self._finish_step(answer, t, h))
+        return [FMI3DoStep(flags=flags, times=times, interrupted=finish, **common)]
 
     def _resume(self) -> None:
         self.fmi.attempt("enter step mode", self.api.enterStepMode)

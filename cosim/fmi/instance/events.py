@@ -7,7 +7,6 @@ due. Clocked variables are set and got while their clock is active.
 
 from __future__ import annotations
 
-import ctypes
 import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import FMUError
-from ...loop.operations import CALL, COPY, Op
-from ...loop.signals import Failures
+from ...loop.operations import Call, Copy, Operation
+from ...loop.signals import RunSignals
 from ...result import SimulationError
 from ..fmu import FMU
 from .instance import Exchange, FMUInstance
@@ -32,11 +31,10 @@ class EventInstance(FMUInstance):
     #: whether there is an event mode, in which alone discrete inputs can be set
     event_mode: bool = True
 
-    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
+    def __init__(self, name: str, fmu: FMU, failures: RunSignals, used: set[str]) -> None:
         super().__init__(name, fmu, failures, used)
         #: when the next time event is due
         self.event_time = np.array([np.inf])
-        self.input_callbacks: list[Any] = []
         self._output_clocks = [c.reference for c in fmu.clocks.values() if c.is_output]
 
     def arrays(self) -> list[Any]:
@@ -53,7 +51,7 @@ class EventInstance(FMUInstance):
 
     # ---------------------------------------------------------------------- operations
 
-    def latch(self) -> list[Op]:
+    def latch(self) -> list[Operation]:
         """Set the inputs; in event mode those that can change at events only."""
         waiting = [x for x in self.inputs if self.event_mode and x.discrete]
         native = [op for x in self.inputs if x not in waiting for op in self._set_inputs(x)]
@@ -62,21 +60,19 @@ class EventInstance(FMUInstance):
             return [*native, *self._latch_texts()]
         if not waiting and not self.fmu.clocks and not self.text_sources:
             return native
-        tell = self.failures.guard(self.name, lambda t, h: self._tell(t, waiting))
-        self.input_callbacks.append(tell)
-        address = ctypes.cast(tell, ctypes.c_void_p).value or 0
+        tell = self.failures.callback(self.name, lambda t, h: self._tell(t, waiting))
         what = "discrete inputs and clocks" if self.fmu.clocks else "discrete inputs"
-        told = Op(f"{self.name}: {what} (Python callback)", CALL, address, participant=self.name)
+        told = Call(text=f"{self.name}: {what} (Python callback)", function=tell, participant=self.name)
         return [*native, *forget, *(op for x in waiting for op in self._from_floats(x)), told]
 
-    def _get_outputs(self, x: Exchange, final: bool) -> list[Op]:
+    def _get_outputs(self, x: Exchange, final: bool) -> list[Operation]:
         if x.is_clock:
             return [self._scaled(x.told, x.values, 1.0)]
         return [] if x.clocks else super()._get_outputs(x, final)
 
-    def _scaled(self, source: Any, target: Any, factor: float) -> Op:
+    def _scaled(self, source: Any, target: Any, factor: float) -> Operation:
         a, b = int(source.ctypes.data), int(target.ctypes.data)
-        return Op("", COPY, a=a, b=b, n=len(source), weights=(factor, 0.0), participant=self.name)
+        return Copy(source=a, target=b, count=len(source), factor=factor, participant=self.name)
 
     # -------------------------------------------------------------------------- events
 

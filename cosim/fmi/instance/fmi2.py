@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...loop.operations import FMI2_COMPLETED, FMI2_DO_STEP, FMI2_VALUES, NUMBERS, Number
+from ...loop.fmi_operations import FMI2Values
+from ...loop.numbers import NUMBERS, Number
 from ..ports import Shape
 from .adapter import Adapter
 from .fmi2_log import callbacks
@@ -24,7 +25,7 @@ class Fmi2(Adapter):
         "Boolean": ("Boolean", Number("i32", "int32", 0, 1)),
     }
     DERIVATIVES = "fmi2GetDerivatives"
-    VALUES, DO_STEP, COMPLETED = FMI2_VALUES, FMI2_DO_STEP, FMI2_COMPLETED
+    VALUES = FMI2Values
     FLAG = "int32"
 
     @staticmethod

@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ...errors import FMUError
-from ...loop.operations import FMI3_COMPLETED, FMI3_DO_STEP, FMI3_VALUES, NUMBERS, Number
+from ...loop.fmi_operations import FMI3Values
+from ...loop.numbers import NUMBERS, Number
 from ..ports import Shape
 from .adapter import Adapter, StepAnswer
 
@@ -26,7 +27,7 @@ class Fmi3(Adapter):
         "Clock": ("Clock", NUMBERS["Float64"]),  # as a port; its start value is an interval
     }
     DERIVATIVES = "fmi3GetContinuousStateDerivatives"
-    VALUES, DO_STEP, COMPLETED = FMI3_VALUES, FMI3_DO_STEP, FMI3_COMPLETED
+    VALUES = FMI3Values
     FLAG = "uint8"
 
     @staticmethod

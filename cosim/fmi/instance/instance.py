@@ -14,9 +14,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import CosimError, FMUError, SnapshotError
-from ...loop.operations import CALL, FROM_FLOAT, TO_FLOAT, Number, Op
-from ...loop.signals import Failures, ctrl_c
-from ...run.kernel_instance import buffer
+from ...loop.conversions import FromFloat, ToFloat
+from ...loop.instance import buffer
+from ...loop.numbers import Number
+from ...loop.operations import Call, Operation
+from ...loop.signals import RunSignals, ctrl_c
 from ..fmu import FMU
 from ..ports import FMUPort
 
@@ -54,7 +56,7 @@ class FMUInstance:
     is_compiled = True
     model_exchange: ClassVar[bool] = False
 
-    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
+    def __init__(self, name: str, fmu: FMU, failures: RunSignals, used: set[str]) -> None:
         self.name = name
         self.fmu = fmu
         self.failures = failures
@@ -83,9 +85,8 @@ class FMUInstance:
         self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}
         self.told_texts: dict[str, Any] = {}
         #: where those of inputs come from
-        self.text_sources: dict[str, tuple[FMUInstance, str]] = {}
-        self.text_callbacks: list[Any] = []
-        self.has_outputs = bool(self.outputs)
+        self.text_sources: dict[str, tuple[Any, str]] = {}
+        self.is_ended = False
 
     def _exchanges(self, ports: dict[str, FMUPort]) -> list[Exchange]:
         groups: dict[tuple[str, Number, bool, frozenset[int]], list[FMUPort]] = {}
@@ -124,6 +125,7 @@ class FMUInstance:
 
     def stop(self) -> str:
         """Terminate and free the instance; return how it crashed in that, if it is isolated and did."""
+        self.is_ended = True
         before = self.fmi.crash()
         with ctrl_c(self.failures):
             self._end()
@@ -154,6 +156,23 @@ class FMUInstance:
     def can_serialise(self) -> bool:
         """Tell whether the FMU can give its state as bytes."""
         return bool(self.can_save and self.fmi.interface.canSerializeFMUstate)
+
+    @property
+    def is_gone(self) -> bool:
+        """Tell whether the process that it ran in has ended."""
+        return self.fmi.is_gone
+
+    @property
+    def unrepeatable(self) -> str:
+        """Why a step cannot be undone and repeated; "" if it can."""
+        if self.fmu.clocks:
+            return "clocks would tick at every repetition of a step"
+        if not self.can_save:
+            return (
+                "it cannot get and set its state (canGetAndSetFMUState), which the repetition of a step "
+                "needs; export it with that capability"
+            )
+        return ""
 
     def kind(self) -> tuple[Any, ...]:
         """Return what another instance has to share to take back what this one saves."""
@@ -214,56 +233,58 @@ class FMUInstance:
         """Return the address of the floats of a port."""
         return next(x.addresses[port] for x in [*self.inputs, *self.outputs] if port in x.addresses)
 
-    def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
+    def read(self, fraction: float = 0.0, final: bool = True) -> list[Operation]:
         """Get the outputs that are used; they must be finite unless inputs are still to come."""
         return [op for x in self.outputs for op in self._get_outputs(x, final)]
 
-    def _get_outputs(self, x: Exchange, final: bool) -> list[Op]:
+    def _get_outputs(self, x: Exchange, final: bool) -> list[Operation]:
         is_float64 = x.raw is x.values
-        got = replace(self._values("Get", x, int(is_float64 and final)), text=f"{self.name}: outputs (FMU)")
-        return [got] if is_float64 else [got, self._convert(TO_FLOAT, x, x.raw, x.values)]
+        got = replace(self._values("Get", x, is_float64 and final), text=f"{self.name}: outputs (FMU)")
+        return [got] if is_float64 else [got, self._convert(ToFloat, x, x.raw, x.values)]
 
-    def _values(self, what: str, x: Exchange, check: int = 0) -> Op:
-        return Op(
-            "",
-            self.fmi.VALUES,
-            self._function(f"{self.fmi.PREFIX}{what}{x.access}"),
-            self._component,
-            int(x.references.ctypes.data),
-            int(x.raw.ctypes.data),
-            check,
-            n=len(x.references),
+    def _values(self, what: str, x: Exchange, finite: bool = False) -> Operation:
+        return self.fmi.VALUES(
+            function=self._function(f"{self.fmi.PREFIX}{what}{x.access}"),
+            component=self._component,
+            references=int(x.references.ctypes.data),
+            values=int(x.raw.ctypes.data),
+            n_references=len(x.references),
             count=len(x.elements),
+            finite=finite,
             participant=self.name,
         )
 
-    def _convert(self, code: int, x: Exchange, source: Any, target: Any) -> Op:
-        a, b, n = int(source.ctypes.data), int(target.ctypes.data), len(x.elements)
-        return Op("", code, a=a, b=b, n=n, number=x.number, participant=self.name)
+    def _convert(self, kind: type[ToFloat | FromFloat], x: Exchange, source: Any, target: Any) -> Operation:
+        return kind(
+            source=int(source.ctypes.data),
+            target=int(target.ctypes.data),
+            count=len(x.elements),
+            number=x.number,
+            participant=self.name,
+        )
 
-    def latch(self) -> list[Op]:
+    def latch(self) -> list[Operation]:
         """Set the inputs."""
         numbers = [op for x in self.inputs for op in self._set_inputs(x)]
         return [*numbers, *self._latch_texts()]
 
-    def _set_inputs(self, x: Exchange) -> list[Op]:
+    def _set_inputs(self, x: Exchange) -> list[Operation]:
         return [*self._from_floats(x), self._values("Set", x)]
 
-    def _from_floats(self, x: Exchange) -> list[Op]:
-        return [] if x.raw is x.values else [self._convert(FROM_FLOAT, x, x.values, x.raw)]
+    def _from_floats(self, x: Exchange) -> list[Operation]:
+        return [] if x.raw is x.values else [self._convert(FromFloat, x, x.values, x.raw)]
 
     # --------------------------------------------------------- strings and binary data
 
-    def _text_op(self, what: str, function: Callable[[float, float], None]) -> Op:
-        self.text_callbacks.append(self.failures.guard(self.name, function))
-        address = ctypes.cast(self.text_callbacks[-1], ctypes.c_void_p).value or 0
-        return Op(f"{self.name}: {what} (Python callback)", CALL, address, participant=self.name)
+    def _text_op(self, what: str, function: Callable[[float, float], None]) -> Operation:
+        text = f"{self.name}: {what} (Python callback)"
+        return Call(text=text, function=self.failures.callback(self.name, function), participant=self.name)
 
-    def read_texts(self) -> list[Op]:
+    def read_texts(self) -> list[Operation]:
         """Get the strings and binary data that are used."""
         return [self._text_op("text outputs", self._get_texts)] if self.texts else []
 
-    def _latch_texts(self) -> list[Op]:
+    def _latch_texts(self) -> list[Operation]:
         if not self.text_sources:
             return []
         return [self._text_op("text inputs", lambda t, h: self._set_texts(self._new_texts()))]

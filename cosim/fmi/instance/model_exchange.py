@@ -9,20 +9,18 @@ is integrated by the method of all, with one step for all: events are handled at
 
 from __future__ import annotations
 
-import ctypes
 import math
 import warnings
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ...core.tableaus import TABLEAUS
 from ...errors import CosimError, LateEventWarning
-from ...loop.operations import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
-from ...loop.signals import Failures
-from ...run.kernel_instance import buffer
+from ...loop.fmi_operations import CompletedStep, End, SetTime, UnlessEvent, Vector
+from ...loop.instance import buffer
+from ...loop.operations import SLACK, Call, Combine, Copy, Operation
+from ...loop.signals import RunSignals
 from ..fmu import FMU
 from .continuous_time import ContinuousTime
 from .event_steps import EventSteps, RungeKutta
@@ -34,7 +32,7 @@ class ModelExchangeInstance(EventInstance):
 
     model_exchange: ClassVar[bool] = True
 
-    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str]) -> None:
+    def __init__(self, name: str, fmu: FMU, failures: RunSignals, used: set[str]) -> None:
         super().__init__(name, fmu, failures, used)
         try:
             self.n_states, self.n_indicators = self.fmi.counts()
@@ -46,8 +44,7 @@ class ModelExchangeInstance(EventInstance):
         self.flags = np.zeros(2, dtype=self.fmi.FLAG)
         self.signs = buffer(self.n_indicators) > 0.0
         self.stages = buffer(5 * self.n_states)
-        self.event_callback: Any = None
-        self.callbacks: list[Any] = []
+        self._event_callback = 0
         self.model = ContinuousTime(self.fmi, self.n_states, self.n_indicators)
         #: what integrates it under sampled coupling
         self.solver = fmu.solver or ("cvode" if self.n_indicators else "ode4")
@@ -65,36 +62,28 @@ class ModelExchangeInstance(EventInstance):
 
     # ---------------------------------------------------------------------- operations
 
-    def _callback(self, function: Callable[[float, float], None]) -> int:
-        self.callbacks.append(self.failures.guard(self.name, function))
-        return ctypes.cast(self.callbacks[-1], ctypes.c_void_p).value or 0
-
-    def advance(self) -> list[Op]:
+    def advance(self) -> list[Operation]:
         """Integrate over the step, with the inputs held."""
         if self.solver == "cvode":
             text = f"{self.name}: cvode, tolerance {self.fmu.tolerance:g}, from event to event"
+            carry = self.failures.callback(self.name, self._carry_by_cvode)
             return [
-                Op(
-                    f"{text} (FMU, Python callback)",
-                    CALL,
-                    self._callback(self._carry_by_cvode),
-                    participant=self.name,
-                )
+                Call(text=f"{text} (FMU, Python callback)", function=carry, participant=self.name),
             ]
-        split = self._callback(self._carry_by_fixed_steps)
+        split = self.failures.callback(self.name, self._carry_by_fixed_steps)
         event_time = int(self.event_time.ctypes.data)
         text = f"{self.name}: {self.solver}, {self.fmu.substeps} substeps, split at time events (FMU)"
-        unless = Op(text, UNLESS_EVENT, c=split, d=event_time, participant=self.name)
-        return [unless, *self._fixed_steps(), Op("", END, participant=self.name)]
+        unless = UnlessEvent(text=text, split=split, event_time=event_time, participant=self.name)
+        return [unless, *self._fixed_steps(), End(participant=self.name)]
 
-    def _fixed_steps(self) -> list[Op]:
+    def _fixed_steps(self) -> list[Operation]:
         """Integrate by Runge-Kutta over the model's derivatives."""
         nodes, rows, weights = TABLEAUS[self.solver]
         part = 1.0 / self.fmu.substeps
         base = self.stages.ctypes.data
-        ops: list[Op] = []
+        ops: list[Operation] = []
         for j in range(self.fmu.substeps):
-            ops.append(Op("", COPY, a=self.state_address, b=base, n=self.n_states, weights=(1.0, 0.0)))
+            ops.append(Copy(source=self.state_address, target=base, count=self.n_states))
             for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
                 c = (j + node) * part
                 if i > 0:
@@ -105,46 +94,60 @@ class ModelExchangeInstance(EventInstance):
             ops.append(self._combine(base, [part * w for w in weights]))
         return [*ops, *self.set_states(1.0), *self.complete()]
 
-    def _combine(self, base: int, weights: list[float]) -> Op:
-        slopes = base + 8 * self.n_states
-        return Op(
-            "", COMBINE, a=base, b=slopes, c=self.state_address, n=self.n_states, weights=tuple(weights),
+    def _combine(self, base: int, weights: list[float]) -> Operation:
+        return Combine(
+            start=base,
+            slopes=base + 8 * self.n_states,
+            result=self.state_address,
+            count=self.n_states,
+            weights=tuple(weights),
             participant=self.name,
-        )  # fmt: skip
+        )
 
-    def _vector(self, name: str, address: int) -> Op:
-        n = self.n_states
-        return Op("", FMI_VECTOR, self._function(name), self._component, address, n=n, participant=self.name)
+    def _vector(self, name: str, address: int) -> Operation:
+        return Vector(
+            function=self._function(name),
+            component=self._component,
+            values=address,
+            count=self.n_states,
+            participant=self.name,
+        )
 
-    def set_states(self, fraction: float) -> list[Op]:
+    def set_states(self, fraction: float) -> list[Operation]:
         """Set time and states."""
-        time = self._function(f"{self.fmi.PREFIX}SetTime")
-        ops = [Op("", FMI_TIME, time, self._component, fraction=fraction, participant=self.name)]
+        time = SetTime(
+            function=self._function(f"{self.fmi.PREFIX}SetTime"),
+            component=self._component,
+            fraction=fraction,
+            participant=self.name,
+        )
         states = f"{self.fmi.PREFIX}SetContinuousStates"
-        return [*ops, self._vector(states, self.state_address)] if self.n_states else ops
+        return [time, self._vector(states, self.state_address)] if self.n_states else [time]
 
-    def derivatives(self, target: int, fraction: float) -> list[Op]:
+    def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Get the derivatives into `target`."""
         return [self._vector(self.fmi.DERIVATIVES, target)] if self.n_states else []
 
-    def complete(self) -> list[Op]:
+    def complete(self) -> list[Operation]:
         """Tell the model that a step is completed; handle its events."""
         # always told, even where the model says that it need not be: FMPy reads that flag inverted
         function = self._function(f"{self.fmi.PREFIX}CompletedIntegratorStep")
-        flags, event_time = int(self.flags.ctypes.data), int(self.event_time.ctypes.data)
-        told = Op(
-            "", self.fmi.COMPLETED, function, self._component, flags, self._events_address(), event_time
+        events = self._event_callback = self._event_callback or self.failures.callback(
+            self.name, self._handle_events
         )
-        ops = [replace(told, fraction=1.0, participant=self.name)]
-        if self.n_indicators:
-            text = f"{self.name}: events (Python callback)"
-            ops.append(Op(text, CALL, self._events_address(), fraction=1.0, participant=self.name))
-        return ops
-
-    def _events_address(self) -> int:
-        if self.event_callback is None:
-            self.event_callback = self.failures.guard(self.name, self._handle_events)
-        return ctypes.cast(self.event_callback, ctypes.c_void_p).value or 0
+        completed = CompletedStep(
+            function=function,
+            component=self._component,
+            flags=int(self.flags.ctypes.data),
+            event_time=int(self.event_time.ctypes.data),
+            events=events,
+            boolean=f"i{8 * self.flags.itemsize}",
+            fraction=1.0,
+            participant=self.name,
+        )
+        text = f"{self.name}: events (Python callback)"
+        call = Call(text=text, function=events, fraction=1.0, participant=self.name)
+        return [completed, call] if self.n_indicators else [completed]
 
     # ------------------------------------------------------------------ steps in Python
 

@@ -37,7 +37,7 @@ from ...codegen.c_compiler import (
 )
 from ...codegen.kernels import cache_directory
 from ...errors import CompilationError, FMUError
-from ...loop.signals import Failures
+from ...loop.signals import RunSignals
 from .functions import sources as generated_sources
 
 _SOURCES = Path(__file__).parent / "c"
@@ -106,7 +106,7 @@ class Isolation:
     Raises FMUError if the library cannot be loaded.
     """
 
-    def __init__(self, name: str, library: Path, failures: Failures) -> None:
+    def __init__(self, name: str, library: Path, failures: RunSignals) -> None:
         self.name = name
         self.failures = failures
         #: how the process ended unexpectedly, or ""

@@ -137,16 +137,16 @@ class Chain(Block):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"step": 0.0}, "step=0 s; a communication step is above zero"),
+        ({"step": 0.0}, "step=0 s; a communication step must be above zero"),
         ({"step": -0.1}, "above zero"),
-        ({"step": math.nan}, "no finite number"),
-        ({"step": "0.1"}, "no finite number"),
+        ({"step": math.nan}, "must be a finite number"),
+        ({"step": "0.1"}, "must be a finite number"),
         ({"step": 0.03}, "the time from start to stop of 1 s is 33.3333 communication steps"),
         ({"step": 0.1 + 1e-8}, "must be a whole number of them"),
         ({"step": 1e-320}, "more than can be counted"),
         ({"stop": 0.0}, "is not after start"),
-        ({"stop": math.inf}, "no finite number"),
-        ({"stop": None}, "stop=None is no finite number"),
+        ({"stop": math.inf}, "must be a finite number"),
+        ({"stop": None}, "stop=None must be a finite number"),
         ({"decimation": 0}, "decimation=0"),
         ({"decimation": 2.5}, "decimation=2.5"),
         ({"coupling": "sample"}, "did you mean 'sampled'"),
@@ -154,8 +154,8 @@ class Chain(Block):
         ({"coupling": None}, "coupling 'None' is not known"),
         ({"solver": ["ode3"]}, "is not known; did you mean 'ode3'"),
         ({"record": "ramp.u"}, "give a list of ports"),
-        ({"record": [1]}, "is no list of ports"),
-        ({"statistics": 5}, "5 is no list of ports"),
+        ({"record": [1]}, "must be a list of ports"),
+        ({"statistics": 5}, "5 must be a list of ports"),
     ],
 )
 def test_what_does_not_fit_the_grid_is_refused(options, words):

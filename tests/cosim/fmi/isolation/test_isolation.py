@@ -19,7 +19,7 @@ from cosim import FMU, Block, FMUError, Output, Simulation, SimulationError, Sna
 from cosim.fmi.instance.fmi2 import Fmi2
 from cosim.fmi.instance.fmi3 import Fmi3
 from cosim.fmi.isolation.isolation import compile_support
-from cosim.loop.signals import Failures
+from cosim.loop.signals import RunSignals
 from fmus.export import export
 from tests.cosim.fmi.ball import ball
 from tests.cosim.fmi.crash import crash
@@ -152,7 +152,7 @@ def test_several_instances_of_what_a_process_can_have_once_only(tmp_path):
 @contextmanager
 def instance(adapter, fmu):
     """An instance by itself, to call its functions one by one."""
-    fmi = adapter(fmu, "p", False, Failures())
+    fmi = adapter(fmu, "p", False, RunSignals())
     try:
         yield fmi
         fmi.api.freeInstance()
