@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from .core.variables import Array
+from .arrays import Array
 
 
 def sign(x: float) -> float:

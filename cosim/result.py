@@ -11,7 +11,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from .core.variables import Array
+from .arrays import Array
 from .errors import CosimError, RecordError, WiringError, did_you_mean
 from .units import conversion
 

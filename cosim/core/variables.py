@@ -23,11 +23,11 @@ from numbers import Real
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Array as Array
 from ..errors import DeclarationError
 
-Array: TypeAlias = NDArray[np.float64]
 Size: TypeAlias = int | str
 Shape: TypeAlias = Size | tuple[Size, ...]
 Kind = Literal["input", "output", "state", "derivative", "local", "parameter"]
