@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..errors import DeclarationError, did_you_mean
-from ..functions import integrate_ode4, linear_hold
+from .integrators import integrate_ode4, linear_hold
 from .port import Direction, Port
 from .variables import KINDS, Array, Local, Parameter, Variable, whole_number
 
