@@ -396,6 +396,7 @@ class Simulation:
             time=self.start + k * self.step,
             signals=signals,
             units={str(p): p.unit for p in [*program.recorded, *program.watched]},
+            definitions={str(p): p.definition for p in program.recorded if p.definition is not None},
             texts={str(port): texts[:rows] for port, texts in program.recorded_texts.items()},
             statistics=self._statistics(sampled),
             step=self.step,
