@@ -1,14 +1,12 @@
-"""Functions for kernels: no allocation, no Python runtime, results in memory of the caller.
+"""Functions for kernels: no allocation, no Python runtime, results in the caller's memory.
 
-Plain Python, so a kernel that is debugged interpreted runs the very same code. Any
-function of a user's own that keeps to Numba's subset may be called from a kernel too.
+They are plain Python, so that a kernel in a debugger runs the very same code. A kernel may
+also call any function of the user's own that keeps to Numba's subset.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 from .arrays import Array
 
@@ -71,7 +69,7 @@ def matvec_add(A: Array, x: Array, y: Array) -> None:
 
 
 def transposed_matvec(A: Array, x: Array, y: Array) -> None:
-    """y = A' x; A (n, m). From about 20 rows on several times faster than `matvec`."""
+    """y = A' x; A (n, m). Several times faster than `matvec` from about 20 rows on."""
     fill(y, 0.0)
     transposed_matvec_add(A, x, y)
 
@@ -85,7 +83,7 @@ def transposed_matvec_add(A: Array, x: Array, y: Array) -> None:
 
 
 def matmul(A: Array, B: Array, C: Array) -> None:
-    """C = A B; C is none of A, B."""
+    """C = A B; C must not share memory with A or B."""
     for i in range(A.shape[0]):
         for j in range(B.shape[1]):
             C[i, j] = 0.0
@@ -127,7 +125,7 @@ def solve(A: Array, B: Array) -> None:
 
 
 def balance(A: Array, d: Array) -> None:
-    """A <- D^-1 A D with rows and columns of like size, D = diag(d) of powers of two (Osborne 1960)."""
+    """A <- D^-1 A D with rows and columns of similar size, D = diag(d) of powers of two (Osborne 1960)."""
     n = A.shape[0]
     fill(d, 1.0)
     for _ in range(10):
@@ -153,8 +151,8 @@ def expm(work: Array) -> None:
     """work[0] = e^work[0], by balancing, scaling, the Taylor polynomial of degree 18, and squaring.
 
     work (4, n, n): the matrix, and three matrices of working memory. Scaled to a norm of
-    1 the remainder is below 1/19! = 8e-18. There is one product of matrices in the code,
-    since every one that is written costs a second of compilation.
+    1 the remainder is below 1/19! = 8e-18. The code has a single product of matrices,
+    because each one that is written costs a second of compilation.
     """
     n = work.shape[1]
     A, S, W, d = work[0], work[1], work[2], work[3, 0]
@@ -182,104 +180,3 @@ def expm(work: Array) -> None:
     for i in range(n):
         for j in range(n):
             A[i, j] = S[i, j] * (d[i] / d[j])
-
-
-def calls_kernel(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Mark a function that stands for the kernel `name` of its first argument; the compiler calls that."""
-
-    def mark(function: Callable[..., None]) -> Callable[..., None]:
-        function.kernel = name  # type: ignore[attr-defined]
-        return function
-
-    return mark
-
-
-@calls_kernel("derivatives")
-def derivatives_of(self: Any, t: float) -> None:
-    """Run the derivatives kernel of a Continuous, from within another of its kernels."""
-    self.derivatives(t)
-
-
-def integrate_ode4(self: Any, t: float, h: float) -> None:
-    """Carry the states of a Continuous over h by the classical Runge-Kutta method, inputs held."""
-    substeps = 1
-    if self.max_step < h:
-        substeps = math.ceil(h / self.max_step - 1e-9)
-    x, dx = self.state_vector, self.derivative_vector
-    start, total = self.integrator_work[0], self.integrator_work[1]
-    n = x.shape[0]
-    dt = h / substeps
-    for k in range(substeps):
-        tk = t + k * dt
-        derivatives_of(self, tk)
-        for i in range(n):
-            start[i] = x[i]
-            total[i] = dx[i]
-            x[i] = start[i] + 0.5 * dt * dx[i]
-        derivatives_of(self, tk + 0.5 * dt)
-        for i in range(n):
-            total[i] += 2.0 * dx[i]
-            x[i] = start[i] + 0.5 * dt * dx[i]
-        derivatives_of(self, tk + 0.5 * dt)
-        for i in range(n):
-            total[i] += 2.0 * dx[i]
-            x[i] = start[i] + dt * dx[i]
-        derivatives_of(self, tk + dt)
-        for i in range(n):
-            x[i] = start[i] + dt / 6.0 * (total[i] + dx[i])
-
-
-def linear_hold(self: Any, t: float, h: float) -> None:
-    """Carry the states of a LinearContinuous over h exactly, inputs held."""
-    x, u = self.state_vector, self.input_vector
-    m = u.shape[0]
-    if h != self.hold_step:
-        linear_hold_matrices(self, t, h)
-    assign(x, self.hold_x)
-    assign(u, self.hold_u)
-    self.hold_u[m] = 1.0
-    transposed_matvec(self.hold_A, self.hold_x, x)
-    transposed_matvec_add(self.hold_B, self.hold_u, x)
-
-
-def linear_hold_matrices(self: Any, t: float, h: float) -> None:
-    """Read A, B and c off the derivatives and compute what `linear_hold` needs for the step h."""
-    x, u, dx = self.state_vector, self.input_vector, self.derivative_vector
-    n, m = x.shape[0], u.shape[0]
-    assign(x, self.hold_x)
-    assign(u, self.hold_u)
-    fill(x, 0.0)
-    fill(u, 0.0)
-    M = self.hold_work[0]
-    size = n + m + 1
-    for i in range(size):
-        for j in range(size):
-            M[i, j] = 0.0
-    derivatives_of(self, t)
-    for i in range(n):
-        M[i, n + m] = dx[i]  # c
-    for j in range(n):
-        x[j] = 1.0
-        derivatives_of(self, t)
-        x[j] = 0.0
-        for i in range(n):
-            M[i, j] = dx[i] - M[i, n + m]  # A
-    for j in range(m):
-        u[j] = 1.0
-        derivatives_of(self, t)
-        u[j] = 0.0
-        for i in range(n):
-            M[i, n + j] = dx[i] - M[i, n + m]  # B
-    for i in range(n):
-        for j in range(size):
-            M[i, j] *= h
-    expm(self.hold_work)
-    for i in range(n):
-        for j in range(n):
-            self.hold_A[j, i] = M[i, j]
-        for j in range(m + 1):
-            self.hold_B[j, i] = M[i, n + j]
-    assign(self.hold_x, x)
-    for j in range(m):
-        u[j] = self.hold_u[j]
-    self.hold_step = h

@@ -13,13 +13,13 @@ import numpy as np
 
 from .arrays import Array
 from .errors import CosimError, RecordError, WiringError, did_you_mean
-from .units import conversion
+from .units import Definition, conversion
 
 if TYPE_CHECKING:
     import pandas
 
 
-#: what .npz keeps beside time, signals and statistics
+#: the fields that .npz keeps beside time, signals, statistics and what is not plain JSON
 _SAVED = ("units", "step", "steps", "seconds", "schedule", "interrupted", "ended")
 
 
@@ -37,9 +37,9 @@ def _from_json(text: Any) -> Any:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Statistics of one port over all communication points 0..n, with its shape (m,) or as numbers.
+    """Statistics of one port over all communication points 0..n: numbers, or arrays (m,).
 
-    minimum, maximum, mean, rms; peak, the largest magnitude; norm, the root of the sum of squares.
+    `peak` is the largest magnitude, `norm` the root of the sum of squares.
     """
 
     minimum: Any
@@ -62,12 +62,14 @@ class Result:
         (r,) recorded communication points in s
     signals
         port name -> (r,) or (r, m)
+    definitions
+        port name -> the definition of its unit, where an FMU gives one
     texts
         port name of a String or Binary -> a str or bytes at each recorded point
     interrupted
-        True when the run was stopped before its end; what was computed is here
+        True when the run was stopped before its end; the result holds the part that was computed
     ended
-        which participant asked to end the run before its stop time, and when; "" if none did
+        the participant that asked to end the run before its stop time, and when; "" if none did
     """
 
     time: Array
@@ -81,10 +83,11 @@ class Result:
     interrupted: bool = False
     ended: str = ""
     texts: dict[str, list[Any]] = field(default_factory=dict)
+    definitions: dict[str, Definition] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Array:
         if name in self.texts:
-            raise WiringError(f"{name} is text; it is in result.texts[{name!r}]")
+            raise WiringError(f"{name} is a String or Binary; use result.texts[{name!r}]")
         if name not in self.signals:
             raise WiringError(f"the result has no signal '{name}'" + did_you_mean(name, self.signals))
         return self.signals[name]
@@ -93,9 +96,9 @@ class Result:
         """Return a signal in another unit, such as `result.in_unit("plant.x", "mm")`."""
         values, own = self[name], self.units.get(name)
         if own is None:
-            raise WiringError(f"{name} has no unit that could be converted to '{unit}'")
+            raise WiringError(f"{name} has no unit, so it cannot be converted to '{unit}'")
         try:
-            scale, offset = conversion(own, unit)
+            scale, offset = conversion(own, unit, self.definitions.get(name))
         except WiringError as error:
             raise WiringError(f"{name} in {own}: {error}") from error
         return scale * values + offset
@@ -104,7 +107,7 @@ class Result:
         return name in self.signals
 
     def columns(self) -> dict[str, Array]:
-        """Return every scalar as a column of its own: "building.accel[3]" -> (r,)."""
+        """Return one column for each scalar: "building.accel[3]" -> (r,)."""
         flat: dict[str, Array] = {}
         for name, values in self.signals.items():
             if values.ndim == 1:
@@ -114,12 +117,14 @@ class Result:
         return flat
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write everything as .npz (exact), or the signals as .csv (17 digits)."""
+        """Write the whole result as .npz (exact), or the signals as .csv (17 digits)."""
         path = Path(path)
         if path.suffix == ".npz":
             kept = {name: getattr(self, name) for name in _SAVED}
             texts = {n: [_as_json(v) for v in values] for n, values in self.texts.items()}
-            meta = json.dumps(kept | {"statistics": self._listed(), "texts": texts})
+            definitions = {n: [d.exponents, d.factor, d.offset] for n, d in self.definitions.items()}
+            more = {"statistics": self._listed(), "texts": texts, "definitions": definitions}
+            meta = json.dumps(kept | more)
             arrays: dict[str, Any] = {"time": self.time, **self.signals}
             np.savez(path, _meta=np.array(meta), **arrays)
         elif path.suffix == ".csv":
@@ -129,11 +134,11 @@ class Result:
                 path, np.column_stack(list(columns.values())), "%.17g", ",", header=header, comments=""
             )
         else:
-            raise RecordError(f"cannot write a result as '{path.suffix}'; choose .npz or .csv")
+            raise RecordError(f"a result cannot be written as '{path.suffix}'; choose .npz or .csv")
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Result:
-        """Read what `save` wrote as .npz."""
+        """Read a result that `save` wrote as .npz."""
         try:
             with np.load(path) as data:
                 meta = json.loads(str(data["_meta"]))
@@ -142,9 +147,18 @@ class Result:
                 statistics = {port: Statistics(*map(_values, values)) for port, values in listed.items()}
                 saved = meta.pop("texts", {})
                 texts = {n: [_from_json(v) for v in values] for n, values in saved.items()}
-                return cls(data["time"], signals, statistics=statistics, texts=texts, **meta)
+                units = meta.pop("definitions", {})
+                definitions = {n: Definition(tuple(powers), *rest) for n, (powers, *rest) in units.items()}
+                return cls(
+                    data["time"],
+                    signals,
+                    statistics=statistics,
+                    texts=texts,
+                    definitions=definitions,
+                    **meta,
+                )
         except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
-            raise RecordError(f"{path} is no result that was saved as .npz: {error}") from error
+            raise RecordError(f"{path} is not a result saved as .npz: {error}") from error
 
     def _listed(self) -> dict[str, list[Any]]:
         return {
@@ -160,13 +174,13 @@ class Result:
 
 
 class SimulationError(CosimError):
-    """A run that had to stop; `result` holds what was computed until then."""
+    """A run that had to stop; `result` holds the part that was computed."""
 
     result: Result | None = None
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a run; `result` holds what was computed until then."""
+    """Ctrl-C during a run; `result` holds the part that was computed."""
 
     def __init__(self, result: Result) -> None:
         super().__init__(f"interrupted at t = {result.time[-1] if len(result.time) else 0.0:g} s")

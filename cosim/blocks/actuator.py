@@ -31,8 +31,8 @@ class Saturation(Block):
 class FirstOrderActuator(Continuous):
     """tau F' + F = u limited to [-limit, limit]
 
-    With |F(0)| <= limit the force never exceeds the limit: it approaches a limited
-    command. Exact for a command held over a step:
+    With |F(0)| <= limit the force never exceeds the limit, because it approaches a limited
+    command. The solution is exact for a command held over a step:
 
         F(t + h) = F(t) + (1 - e^(-h / tau)) (sat u - F(t))
     """

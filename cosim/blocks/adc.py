@@ -20,8 +20,8 @@ class AnalogToDigital(Block):
         c = floor(u / q + 1/2) limited to [-2^(bits-1), 2^(bits-1) - 1]
         y = q c
 
-    The error is at most q/2 for -full_scale - q/2 <= u < full_scale - q/2: the highest
-    level is one q below full scale.
+    The error is at most q/2 for -full_scale - q/2 <= u < full_scale - q/2, because the
+    highest level is one q below full scale.
     """
 
     DEFAULT_SIZES = {"n": 1}
@@ -38,5 +38,7 @@ class AnalogToDigital(Block):
         levels = 2.0 ** (self.bits - 1.0)
         for i in range(self.y.shape[0]):
             q = self.full_scale[i] / levels
-            code = clip(self.u[i] / q, -levels, levels)  # first, so that floor gets a number it can hold
+            code = clip(
+                self.u[i] / q, -levels, levels
+            )  # before floor, which needs a number in the range of integers
             self.y[i] = q * clip(math.floor(code + 0.5) * 1.0, -levels, levels - 1.0)

@@ -14,9 +14,9 @@ from .options import SampledSignal
 class Delay(Block):
     """y_k = u_{k - steps}; y_k = initial for k < steps. k counts the block's own calls.
 
-    Under sampled coupling those are the communication points, or the multiples of
-    its sample period. Under stage coupling it is called at every stage unless it has
-    a sample period; give it one.
+    Under sampled coupling the calls are at the communication points, or at the multiples of
+    its sample period. Under stage coupling it is called at every stage unless it has a
+    sample period, so give it one.
     """
 
     DEFAULT_SIZES = {"n": 1}

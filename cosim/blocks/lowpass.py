@@ -6,7 +6,7 @@ For u held over [t, t + h], exactly
 
     u_f(t + h) = u_f(t) + (1 - e^(-h / tau)) (u - u_f(t))
 
-In the ports u is the signal and y the filtered one, u_f.
+The port u is the signal; the port y is the filtered signal u_f.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class DiscreteLowPass(Block):
 
         y_k = y_{k-1} + (1 - e^(-(t_k - t_{k-1}) / tau)) (u_{k-1} - y_{k-1})
 
-    The same numbers as LowPass under sampled coupling, bit for bit as far as the
-    differences of the times are. y_0 is the start value.
+    The numbers are those of LowPass under sampled coupling, to the rounding of the
+    differences of time. y_0 is the start value.
     """
 
     DEFAULT_SIZES = {"n": 1}

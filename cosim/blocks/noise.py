@@ -1,4 +1,4 @@
-"""Measurement noise: a signal is sampled, and every sample carries its own error."""
+"""Measurement noise: a signal is sampled, and every sample has an error of its own."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .random_stream import normal, seed_streams
 class MeasurementNoise(Block):
     """y_k = u_k + sigma N_k at every sample_period, held in between; N_k standard normal.
 
-    The numbers depend on `seed` and the element alone (random_stream.py). A sensor
-    whose noise is to be independent of another's takes another seed.
+    The numbers depend on `seed` and the element only (random_stream.py). Sensors with
+    independent noise need different seeds.
     """
 
     DEFAULT_SIZES = {"n": 1}

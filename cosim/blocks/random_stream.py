@@ -4,16 +4,19 @@
     q_k = (527612 q_{k-1} - 1370589 q_{k-3}) mod m2,   m2 = 2^32 - 22853
     U_k = ((p_k - q_k) mod m1) / (m1 + 1), with m1 in place of a remainder of 0; 0 < U_k < 1
 
-Every product is below 2^53, so float64 arithmetic is exact and a kernel interpreted,
-compiled or exported gives the same bits (L'Ecuyer 1999, "Good parameters and
-implementations for combined multiple recursive random number generators").
+Every product is below 2^53, so float64 arithmetic is exact, and an interpreted, compiled or
+exported kernel gives the same bits (P. L'Ecuyer, "Good parameters and implementations for
+combined multiple recursive random number generators", Operations Research 47, 1999, 159-164,
+doi:10.1287/opre.47.1.159).
 
-The generator starts at the state (12345, ..., 12345). Seed number `seed` begins
-2^127 seed numbers later, stream i of a seed 2^76 i after that (L'Ecuyer, Simard, Chen
-and Kelton 2002, the streams and substreams of their package): two seeds, and two
-streams of a seed, never share a number in any run that can be finished.
+The generator starts at the state (12345, ..., 12345). Seed number `seed` begins 2^127 `seed`
+numbers later, and stream i of a seed 2^76 i numbers after that, as the streams and substreams
+of P. L'Ecuyer, R. Simard, E. J. Chen and W. D. Kelton, "An object-oriented random-number package
+with many long streams and substreams", Operations Research 50, 2002, 1073-1075,
+doi:10.1287/opre.50.6.1073.358. Two seeds, and two streams of a seed, never share a number in
+any run that can be finished.
 
-Normal numbers by Box and Muller, two uniform ones for each:
+Normal numbers follow from two uniform numbers each (Box and Muller):
 
     N = sqrt(-2 ln U_1) cos(2 pi U_2)
 """
@@ -110,8 +113,8 @@ def advance_state_by_power(work: Array, power: float, x: Array, m: float) -> Non
 def seed_streams(seed: float, streams: Array, work: Array) -> None:
     """Place every row of streams (n, 6) at the start of its stream; work (3, 3, 3).
 
-    Loops in place of `assign`: every further function and kind of array costs a
-    third of a second of compilation.
+    It has loops in place of `assign`, because every further function and kind of array costs
+    a third of a second of compilation.
     """
     for part in range(2):
         first = 3 * part

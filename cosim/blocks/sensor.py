@@ -1,4 +1,4 @@
-"""Sensor dynamics: any transfer function, any state space, and the thesis' 1/(mu s + 1)^2."""
+"""Sensor dynamics: any transfer function, any state space, and 1/(mu s + 1)^2 of the thesis."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class SensorDynamics(Continuous):
 
 
 class StrictlyProper(LinearContinuous):
-    """x' = A x + B u, y = C x: a sensor whose output does not depend on its input at once."""
+    """x' = A x + B u, y = C x: a sensor with an output that does not depend directly on its input."""
 
     A = Parameter(0.0, "dynamics", shape=("n", "n"), fixed=True)
     B = Parameter(0.0, "input", shape=("n", "m"), fixed=True)
@@ -77,7 +77,7 @@ class StrictlyProper(LinearContinuous):
 
 
 class StateSpace(LinearContinuous):
-    """x' = A x + B u, y = C x + D u; without D, `StrictlyProper` has no direct path to close a loop."""
+    """x' = A x + B u, y = C x + D u; use `StrictlyProper` without D, so that no direct path closes a loop."""
 
     A = Parameter(0.0, "dynamics", shape=("n", "n"), fixed=True)
     B = Parameter(0.0, "input", shape=("n", "m"), fixed=True)
@@ -115,8 +115,8 @@ def transfer_function(model: Any, *, unit: str | None = None) -> StateSpace | St
     """
     if getattr(model, "dt", None) not in (None, 0, 0.0, False):
         raise DeclarationError(
-            f"transfer_function: the model is discrete (dt = {model.dt}); give the one in s, "
-            "it is discretised exactly for the step of the run"
+            f"transfer_function: the model is discrete (dt = {model.dt}); give the model in s, "
+            "which is discretised exactly for the step of the run"
         )
     if all(hasattr(model, name) for name in "ABCD"):
         A, B, C, D = (np.atleast_2d(np.asarray(getattr(model, n), dtype=np.float64)) for n in "ABCD")
@@ -140,12 +140,12 @@ def _coefficients(values: Any, what: str) -> Array:
         found = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError) as error:
         raise DeclarationError(
-            f"transfer_function: the {what} is no single polynomial; take one input and one output, "
+            f"transfer_function: the {what} must be a single polynomial; take one input and one output, "
             "model[0, 1], and one sensor for each"
         ) from error
     if found.ndim != 1 or not np.isfinite(found).all():
         raise DeclarationError(
-            f"transfer_function: the {what} {values!r} is no list of finite coefficients; "
+            f"transfer_function: the {what} {values!r} must be finite coefficients; "
             "give one input and one output, highest power of s first"
         )
     return np.trim_zeros(found, "f")

@@ -1,4 +1,4 @@
-"""Signal sources: constant, record, function of time, white noise."""
+"""Signal sources: constant, ground motion or other record, function of time, white noise."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ class Constant(Block):
 
 
 class RecordSource(Block):
-    """A record as a signal: values v_0 .. v_{n-1} at start + i dt, zero outside.
+    """A ground motion or another record as a signal: v_0 .. v_{n-1} at start + i dt, zero outside.
 
         q = (t - start) / dt,  i = floor q
         hold:    y = scale v_i                                  0 <= q < n
         linear:  y = scale (v_i + (q - i) (v_{i+1} - v_i))      0 <= q <= n - 1
 
-    q within 1e-12 of a whole number (relative above 1) is that number: t = k h and
-    i dt are then the same instant, rounded differently. So values at grid points are
-    the record's own, bit for bit, over any length.
+    A q within 1e-12 of a whole number (relative above 1) is taken as that number: t = k h
+    and i dt are then the same instant, rounded differently. Values at grid points are
+    therefore those of the record, bit for bit, over any length.
     """
 
     values = Parameter(0.0, "values", shape="n_values", fixed=True)
@@ -63,7 +63,7 @@ class RecordSource(Block):
         unit: str | None = None,
         **sampled: Unpack[Sampled],
     ) -> None:
-        """Take a GroundMotion (its dt, unit and start), or values with dt and unit."""
+        """Take a GroundMotion with its dt, unit and start, or values with dt and unit."""
         if interpolation not in ("linear", "hold"):
             hint = did_you_mean(str(interpolation), ["linear", "hold"])
             raise DeclarationError(f"RecordSource: interpolation '{interpolation}' is not known{hint}")
@@ -78,7 +78,7 @@ class RecordSource(Block):
         else:
             values = np.asarray(record, dtype=np.float64)
         if dt is None:
-            raise DeclarationError("RecordSource: values without dt; give the sample interval in s")
+            raise DeclarationError("RecordSource: values need dt, the sample interval in s")
         super().__init__(
             values=values,
             dt=dt,
@@ -107,7 +107,7 @@ class RecordSource(Block):
 
 
 def f(t: float) -> float:
-    """Stand for the function of a `function_source`; each has its own in this place."""
+    """Stand for the function of a `function_source`, which replaces it."""
     return t
 
 
@@ -123,15 +123,15 @@ class _FunctionOfTime(Block):
 def function_source(
     function: Callable[[float], float], *, unit: str | None = None, **sampled: Unpack[Sampled]
 ) -> Block:
-    """Return a block with y = function(t), for any function of time in s that gives a number.
+    """Return a block with y = function(t), for any function of time in s that returns a number.
 
-        function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s2")
+        function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s^2")
 
-    A function in Numba's subset is compiled with the block (closures over numbers
-    too); any other is called back, which the run says in a warning.
+    A function in Numba's subset is compiled with the block, closures over numbers
+    included; any other runs as a callback, of which the run warns.
     """
     if not callable(function):
-        raise DeclarationError(f"function_source takes a function of time, got {function!r}")
+        raise DeclarationError(f"function_source needs a function of time, got {function!r}")
     template = _FunctionOfTime.step
     step = types.FunctionType(template.__code__, {**template.__globals__, "f": function}, "step")
     name = "FunctionSource"
@@ -142,12 +142,12 @@ def function_source(
 
 
 class WhiteNoise(Block):
-    """Independent normal numbers, one every sample_period, held in between.
+    """Independent normal numbers, one in every sample_period, held in between.
 
         y_k = mean + sigma N_k,  N_k standard normal (random_stream.py)
 
-    The numbers depend on `seed` and the element alone: not on the communication step,
-    the coupling, the machine's random state, or on how many elements there are.
+    The numbers depend on `seed` and the element only: not on the communication step, the
+    coupling, the random state of the process, or the number of elements.
     """
 
     DEFAULT_SIZES = {"n": 1}

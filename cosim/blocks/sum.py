@@ -1,4 +1,4 @@
-"""Sum of signals, each with its factor: disturbances that act together, an error of control."""
+"""Sum of signals with factors: disturbances that act together, a control error."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Declarations: variables, participants, the time grid."""
+"""The core: declarations, participants in Python, the contract of a component, the time grid."""

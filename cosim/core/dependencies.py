@@ -7,8 +7,8 @@ it by element, for the parameters as they are: fmus/export/dependencies.py.
 The answer is a superset, by variable: assignments are followed without regard to their
 order, a condition counts for everything assigned under it (for everything, where it
 leads to a return, break or continue), a name for an array shares what is written to it,
-and a call writes those arguments that the source of the called function writes. What
-cannot be read depends on everything.
+and a call writes those arguments that the source of the called function writes. The
+outputs of a kernel that cannot be read depend on every input and state.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ class _Flow(ast.NodeVisitor):
         self.dimensions = dimensions
         self.conditions: list[set[str]] = []
         self.edges: list[tuple[set[str], set[str]]] = []
-        #: what decides whether the rest of the function runs
+        #: the names on which it depends whether the rest of the function runs
         self.jumps: set[str] = set()
-        #: names whose elements are written, and names that share memory with each other
+        #: names with elements that are written, and names that share memory with each other
         self.stored: set[str] = set()
         self.shared: list[set[str]] = []
         self.opaque = False
@@ -138,7 +138,7 @@ class _Flow(ast.NodeVisitor):
     visit_FunctionDef = visit_Lambda = visit_Try = visit_With = visit_Match = _unreadable
 
     def called(self, function: ast.expr) -> Any:
-        """Return the function that is called, None when it is not known."""
+        """Return the called function, or None if it is unknown."""
         if isinstance(function, ast.Name):
             return self.globals.get(function.id)
         module = self.globals.get(function.value.id) if _is_dotted(function) else None  # type: ignore[attr-defined]
@@ -168,7 +168,7 @@ def _is_dotted(node: ast.expr) -> bool:
 
 
 def _flow(function: Any, kernel: bool, dimensions: Mapping[str, int]) -> _Flow | None:
-    """Read a function; None when that cannot be done."""
+    """Read a function; return None if its source cannot be read."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
     except (OSError, TypeError, SyntaxError):
@@ -184,7 +184,7 @@ def _flow(function: Any, kernel: bool, dimensions: Mapping[str, int]) -> _Flow |
 
 @lru_cache(maxsize=256)
 def _written(function: Any) -> frozenset[int] | None:
-    """Return which arguments a function may write into, by position; None: any of them."""
+    """Return the positions of the arguments that a function may write into; None means any of them."""
     if isinstance(function, types.BuiltinFunctionType) or function in (float, int, bool, range):
         return frozenset()  # of numbers, such as math.sin
     if not isinstance(function, types.FunctionType) or hasattr(function, "kernel"):

@@ -1,14 +1,14 @@
-"""Participants: blocks and continuous systems, and the record that holds their variables.
+"""Participants: blocks and continuous systems, and the storage of their variables.
 
 A participant is declared once (variables.py) and its equations are written once, as
 kernels: methods that read and write `self`. All variables of an instance lie in one
-record of float64 slots, zone by zone:
+storage of float64 slots, zone by zone:
 
     inputs | outputs | states | derivatives | locals | parameters
 
-Called on the instance a kernel is ordinary Python; compiled (compiler.py) `self` is
-the record itself. The zones are visible to kernels as arrays too: `input_vector`,
-`state_vector`, `derivative_vector`.
+Called on the instance, a kernel is ordinary Python. In a compiled kernel
+(cosim/codegen/kernels.py) `self` is the storage itself. Kernels see the zones as arrays
+too: `input_vector`, `state_vector`, `derivative_vector`.
 """
 
 from __future__ import annotations
@@ -24,35 +24,35 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..errors import DeclarationError, did_you_mean
-from ..functions import integrate_ode4, linear_hold
+from .integrators import integrate_ode4, linear_hold
 from .port import Direction, Port
 from .variables import KINDS, Array, Local, Parameter, Variable, whole_number
 
-#: kernels, and how many of (t, h) each takes
+#: the kernels, and how many of (t, h) each takes
 KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
 _VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
-#: what every instance has of its own, and no copy may share
+#: attributes that each instance owns and no copy may share
 _BOUND = {"memory", "variables", "zones", "_views", *_VECTORS}
 _RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
-#: size names that a Continuous works out itself
+#: names of sizes that a Continuous computes itself
 _AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
 
 
 def _copied(value: Any) -> Any:
-    """Return a copy; an open file and the like cannot be copied and is shared."""
+    """Return a copy; an object that cannot be copied, such as an open file, is shared."""
     with contextlib.suppress(TypeError):
         return copy.deepcopy(value)
     return value
 
 
 def rate(where: str, every: Any, sample_period: Any) -> tuple[int | None, float | None]:
-    """Return `every` and `sample_period` of a block, of which one at most is given."""
+    """Return `every` and `sample_period` of a block, of which at most one may be given."""
     if every is not None and sample_period is not None:
         raise DeclarationError(f"{where}: give every or sample_period, not both")
     if sample_period is not None and not (
         isinstance(sample_period, Real) and math.isfinite(sample_period) and float(sample_period) > 0.0
     ):
-        raise DeclarationError(f"{where}: sample_period={sample_period!r} s is not above zero")
+        raise DeclarationError(f"{where}: sample_period={sample_period!r} s must be above zero")
     return (
         None if every is None else whole_number(f"{where}: every", every),
         None if sample_period is None else float(sample_period),
@@ -60,17 +60,17 @@ def rate(where: str, every: Any, sample_period: Any) -> tuple[int | None, float 
 
 
 class Participant:
-    """What blocks and continuous systems share: declared variables in one record."""
+    """The base of blocks and continuous systems: declared variables in one storage."""
 
-    #: names of the methods that are kernels, in the order in which a run uses them
+    #: the names of the methods that are kernels, in the order in which a run uses them
     KERNELS: ClassVar[tuple[str, ...]] = ()
-    #: False: the kernels contain Python that Numba cannot compile; they are called back
+    #: False: the kernels contain Python that Numba cannot compile, and run as callbacks
     compiled: ClassVar[bool] = True
     #: locals that name the step for which matrices are kept; 0 in them makes `advance` compute anew
     CACHE_KEYS: ClassVar[tuple[str, ...]] = ()
-    #: sizes by name that are neither given nor those of a given array
+    #: sizes by name, for those that neither a keyword nor an array gives
     DEFAULT_SIZES: ClassVar[Mapping[str, int]] = {}
-    #: see component.py, whose contract every participant keeps
+    #: the contract of a component, see component.py
     as_block: bool = False
     every: int | None = None
     sample_period: float | None = None
@@ -97,10 +97,10 @@ class Participant:
             raise DeclarationError(f"{cls.__name__}: '{name}' names a unit and something else; rename one")
         for name, variable in cls._declared.items():
             if cls._is_reserved(name):
-                raise DeclarationError(f"{cls.__name__}: '{name}' is a name of structcosim's own; rename it")
+                raise DeclarationError(f"{cls.__name__}: '{name}' is a name of the base class; rename it")
             if not isinstance(variable.meaning, str):
                 raise DeclarationError(
-                    f"{cls.__name__}.{name}: its meaning is {variable.meaning!r}, which is no text; "
+                    f"{cls.__name__}.{name}: its meaning {variable.meaning!r} must be a text; "
                     "write a start value as start="
                 )
             if variable.kind == "derivative":
@@ -114,15 +114,15 @@ class Participant:
 
     @classmethod
     def _is_reserved(cls, name: str) -> bool:
-        """Tell whether a name is a method or an attribute of ours, not a variable."""
-        ours = [base for base in cls.__mro__ if base.__module__ == __name__]
+        """Tell whether a name is a method or an attribute of the base classes."""
+        bases = [base for base in cls.__mro__ if base.__module__ == __name__]
         return name in _RESERVED or any(
-            not isinstance(vars(b).get(name, cls._declared[name]), Variable) for b in ours
+            not isinstance(vars(b).get(name, cls._declared[name]), Variable) for b in bases
         )
 
     @classmethod
     def _complete(cls, declared: dict[str, Variable]) -> dict[str, Variable]:
-        """Return the declarations with those that follow from others."""
+        """Return the declarations with those that follow from them."""
         return declared
 
     def __init__(self, **values: Any) -> None:
@@ -139,7 +139,7 @@ class Participant:
 
     @classmethod
     def _sizes(cls, values: Mapping[str, Any]) -> dict[str, int]:
-        """Resolve the size names from given arrays and keywords; refuse what is unknown."""
+        """Resolve the names of sizes from given arrays and keywords; refuse unknown names."""
         where = cls.__name__
         symbols = {n for v in cls._declared.values() for n in v.shape if isinstance(n, str)} - _AUTOMATIC
         settable = [n for n, v in cls._declared.items() if v.kind not in ("derivative", "local")]
@@ -176,13 +176,13 @@ class Participant:
         if missing:
             raise DeclarationError(
                 f"{where}: size {', '.join(sorted(missing))} is not known; "
-                f"give it as a keyword ({sorted(missing)[0]}=3) or give an array that has it"
+                f"give it as a keyword ({sorted(missing)[0]}=3) or give an array of that size"
             )
         return {**sizes, **cls._automatic_sizes(sizes)}
 
     @classmethod
     def _automatic_sizes(cls, sizes: Mapping[str, int]) -> dict[str, int]:
-        """Sizes that follow from the others."""
+        """Return the sizes that follow from the others."""
         return {}
 
     def _layout(self, sizes: Mapping[str, int], units: Mapping[str, str | None]) -> None:
@@ -202,7 +202,7 @@ class Participant:
             zones[kind] = (first, slot - first)
         #: first slot and number of slots of each kind
         self.zones = zones
-        self._bind(np.zeros(slot + 1))  # one spare slot: what an empty zone's vector shows
+        self._bind(np.zeros(slot + 1))  # with a spare slot, which the vector of an empty zone shows
 
     def _bind(self, memory: Array) -> None:
         self.memory = memory
@@ -216,7 +216,7 @@ class Participant:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The record as a NumPy dtype; the vectors overlap the variables of their zone."""
+        """The storage as a NumPy dtype; the vectors overlap the variables of their zone."""
         fields = {n: (v.slot, v.shape) for n, v in self.variables.items()}
         spare = self.memory.size - 1
         for name, kind in _VECTORS.items():
@@ -265,18 +265,18 @@ class Participant:
         self._views[variable.name][...] = array
 
     def fresh(self) -> Participant:
-        """Return a copy with a record of its own: what a run works on, so that runs repeat."""
+        """Return a copy with a storage of its own, on which a run works, so that runs are repeatable."""
         other = copy.copy(self)
         other._bind(self.memory.copy())
         other.take_attributes(self.own_attributes())
         return other
 
     def own_attributes(self) -> dict[str, Any]:
-        """Return copies of what Python keeps on the instance beside the declared variables."""
+        """Return copies of the instance's Python attributes, without the declared variables."""
         return {n: _copied(vars(self)[n]) for n in vars(self).keys() - _BOUND}
 
     def take_attributes(self, attributes: Mapping[str, Any]) -> None:
-        """Take copies of what `own_attributes` returned, in place of what there is."""
+        """Replace the Python attributes by copies of those that `own_attributes` returned."""
         for name in vars(self).keys() - _BOUND - attributes.keys():
             delattr(self, name)
         for name, value in attributes.items():
@@ -302,7 +302,7 @@ class Participant:
 
     @property
     def kernels(self) -> dict[str, Callable[..., None]]:
-        """The kernels that this class has, by name."""
+        """The kernels of this class by name."""
         return {name: getattr(type(self), name) for name in self.KERNELS if hasattr(type(self), name)}
 
     def __repr__(self) -> str:
@@ -320,9 +320,9 @@ class Block(Participant):
     every
         acts at every `every`-th communication point and holds its outputs in between
     sample_period
-        the same in seconds; the run refuses one that is no multiple of its step
+        the same in seconds; it must be a multiple of the run's step
 
-    With neither, the block acts at every communication point under sampled coupling,
+    Without either, the block acts at every communication point under sampled coupling,
     and at every solver stage under stage coupling.
     """
 
@@ -352,16 +352,17 @@ class Continuous(Participant):
     """A participant with continuous state: differential equations.
 
     derivatives(self, t)
-        write `der_x` for every state `x` from states, inputs and parameters
+        writes `der_x` for every state `x` from states, inputs and parameters
     outputs(self, t)
-        write the outputs; runs after `derivatives` and may use `der_x`
+        writes the outputs; runs after `derivatives` and may use `der_x`
     advance(self, t, h)
-        carry the states from t to t + h, inputs held. The one given here is the
+        advances the states from t to t + h with the inputs held. The default is the
         classical Runge-Kutta method (ode4) in equal substeps of at most `max_step`;
         a class with an exact solution overrides it.
 
-    A class with an `advance` and no `derivatives` (an implicit method, say) runs under
-    sampled coupling and leaves as a Co-Simulation FMU; stage coupling refuses it.
+    A class with an `advance` and without `derivatives`, such as an implicit method, runs
+    under sampled coupling and can be exported as a Co-Simulation FMU; stage coupling
+    refuses it.
     """
 
     KERNELS = ("initialize", "derivatives", "outputs", "advance")
@@ -380,7 +381,7 @@ class Continuous(Participant):
         if not hasattr(type(self), "derivatives") and type(self).advance is Continuous.advance:
             raise DeclarationError(
                 f"{type(self).__name__} has no derivatives(self, t); a Continuous needs it, or an advance "
-                "of its own (what has no continuous state is a Block)"
+                "of its own (derive a class without continuous state from Block)"
             )
         super().__init__(**values)
 
@@ -421,7 +422,7 @@ class Continuous(Participant):
 
 
 class LinearContinuous(Continuous):
-    """A Continuous whose derivatives are linear in states and inputs, with constant coefficients.
+    """A Continuous with derivatives that are linear in states and inputs, with constant coefficients.
 
         x' = A x + B u + c
 

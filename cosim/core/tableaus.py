@@ -1,7 +1,7 @@
 """Fixed-step explicit Runge-Kutta methods: nodes c, rows a, weights b, and their order.
 
 ode1 Euler, ode2 Heun, ode3 Bogacki and Shampine (1989), ode4 the classical method. The
-names are those of block diagram tools.
+names are those of block-diagram tools.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Declarations: what a block or plant reads, writes, remembers and is set by.
+"""Declarations of the inputs, outputs, states and parameters of a block or plant.
 
     class Gain(Block):
         K = Parameter(2.0, "gain", unit="N/m", min=0.0)
         x = Input("displacement", unit="m")
         u = Output("force", unit="N")
 
-Sizes in `shape` are numbers or names ("n"); a name is resolved when the instance
-is made, from the arrays that it is given or from a keyword (`n=3`). Units may have
-names too, with a dollar sign: `unit="$unit"` or `unit="($unit)/s"` is resolved from the
+Sizes in `shape` are numbers or names ("n"); a name is resolved when an instance is
+made, from the arrays given to it or from a keyword (`n=3`). Units may have names too,
+with a dollar sign: `unit="$unit"` or `unit="($unit)/s"` is resolved from the
 keyword `unit="N"`. A unit of None is not checked, "1" is dimensionless. Type checkers
 see a scalar declaration as `float`, one with a shape as an array; on an instance it is
 that value.
@@ -32,7 +32,7 @@ Size: TypeAlias = int | str
 Shape: TypeAlias = Size | tuple[Size, ...]
 Kind = Literal["input", "output", "state", "derivative", "local", "parameter"]
 
-#: order of the zones in a record
+#: the order of the zones in a storage
 KINDS: tuple[Kind, ...] = ("input", "output", "state", "derivative", "local", "parameter")
 _UNIT_NAME = re.compile(r"\$([A-Za-z_]\w*)")
 
@@ -158,9 +158,9 @@ def State(start: float = ..., meaning: str = ..., *, unit: str | None = ...) -> 
 @overload
 def State(start: ArrayLike = ..., meaning: str = ..., *, shape: Shape, unit: str | None = ...) -> Array: ...
 def State(start: ArrayLike = 0.0, meaning: str = "", *, shape: Shape = (), unit: str | None = None) -> Any:
-    """Declare a state `x`: of a Continuous with its derivative `der_x`, of a Block a memory between steps.
+    """Declare a state `x`: in a Continuous with its derivative `der_x`, in a Block a memory between steps.
 
-    A state is a port too: it can be connected and recorded like an output.
+    A state is a port: it can be connected and recorded like an output.
     """
     return Variable("state", start, meaning, unit, _shape(shape))
 
@@ -170,5 +170,5 @@ def Local(start: float = ..., meaning: str = ..., *, unit: str | None = ...) -> 
 @overload
 def Local(start: ArrayLike = ..., meaning: str = ..., *, shape: Shape, unit: str | None = ...) -> Array: ...
 def Local(start: ArrayLike = 0.0, meaning: str = "", *, shape: Shape = (), unit: str | None = None) -> Any:
-    """Declare working memory of the kernels: not a port, not a parameter, saved with the state."""
+    """Declare working memory of the kernels: neither a port nor a parameter; saved with the state."""
     return Variable("local", start, meaning, unit, _shape(shape))

@@ -1,4 +1,4 @@
-"""Recorded ground motions: read, scaled, resampled."""
+"""Ground motions: reading, scaling, resampling."""
 
 from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
 

@@ -1,7 +1,7 @@
-"""Ground motion records: PEER .AT2 files, plain columns, and the El Centro record that is installed with us.
+"""Ground motions: PEER .AT2 files, plain columns, and the installed El Centro record.
 
 A GroundMotion holds acceleration in m/s^2 at a constant interval. Nothing is scaled,
-filtered, cut or resampled unless a call says so, and then `note` says it too.
+filtered, cut or resampled unless a call asks for it, and then `note` records it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ UNITS = {
     "ft/s^2": 0.3048,
     "in/s^2": 0.0254,
 }
-#: of the interval: how far a printed time may be from the uniform grid
+#: the largest distance of a printed time from the uniform grid, as a part of the interval
 _ROUNDING = 0.02
 _HEADER_LINES = 12
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
@@ -40,7 +40,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """Acceleration values (n,) in m/s^2 at start + i dt, with where they come from and what was done."""
+    """Acceleration values (n,) in m/s^2 at start + i dt, with their source and processing."""
 
     dt: float
     values: Array
@@ -48,7 +48,7 @@ class GroundMotion:
     source: str = ""
     start: float = 0.0
     note: str = ""
-    unit: str = "m/s2"
+    unit: str = "m/s^2"
 
     @property
     def time(self) -> Array:
@@ -61,28 +61,29 @@ class GroundMotion:
         return float(np.abs(self.values).max())
 
     def scaled(self, factor: float) -> GroundMotion:
-        """Return the record times a factor; the note says so."""
+        """Return the ground motion times a factor, which is noted."""
         note = f"{self.note}; scaled by {factor:g}".lstrip("; ")
         return replace(self, values=self.values * factor, note=note)
 
     def resample(self, dt: float, *, method: Literal["linear", "band-limited"]) -> GroundMotion:
-        """Return the record at another interval; both methods change it, each in its own way.
+        """Return the ground motion at another interval; each method changes it in its own way.
 
         linear
-            straight lines between the values: what a linear RecordSource does. Values at
-            common instants stay; a longer interval folds what is above its Nyquist
-            frequency into the record, a shorter one adds weak content above the old one.
+            straight lines between the values, as a linear RecordSource has them. Values at
+            common instants stay. A longer interval folds the content above its Nyquist
+            frequency into the ground motion; a shorter one adds weak content above the old
+            Nyquist frequency.
         band-limited
             scipy.signal.resample_poly: content above the lower of the two Nyquist
-            frequencies is filtered out (a linear-phase filter, no shift in time). Peaks
-            change a little; near both ends the record is taken to be zero outside. The
-            ratio of the intervals must be a fraction of whole numbers up to 1000.
+            frequencies is filtered out, by a linear-phase filter without a shift in time.
+            Peaks change a little; the ground motion is taken to be zero outside its ends.
+            The ratio of the intervals must be a fraction of whole numbers up to 1000.
         """
         if method not in ("linear", "band-limited"):
             hint = did_you_mean(str(method), ["linear", "band-limited"])
             raise RecordError(f"resample: method '{method}' is not known{hint}")
         if not (isfinite(dt) and dt > 0.0):
-            raise RecordError(f"resample: dt = {dt!r} s is not above zero")
+            raise RecordError(f"resample: dt = {dt!r} s must be above zero")
         note = f"resampled from {self.dt:g} s to {dt:g} s, {method}"
         if method == "linear":
             n = int(np.floor((self.values.size - 1) * self.dt / dt * (1.0 + 1e-12))) + 1
@@ -93,7 +94,7 @@ class GroundMotion:
             ratio = Fraction(self.dt / dt).limit_denominator(1000)
             if ratio == 0 or ratio.numerator > 1000 or abs(float(ratio) * dt / self.dt - 1.0) > 1e-9:
                 raise RecordError(
-                    f"resample: {self.dt:g} s to {dt:g} s is no ratio of whole numbers up to 1000; "
+                    f"resample: {self.dt:g} s to {dt:g} s must be a ratio of whole numbers up to 1000; "
                     f'choose such a dt, for example {self.dt / 2:g} s, or method="linear"'
                 )
             from scipy.signal import resample_poly
@@ -103,10 +104,10 @@ class GroundMotion:
 
 
 def read_at2(path: str | PathLike[str], *, name: str | None = None) -> GroundMotion:
-    """Read a PEER .AT2 file: header lines, one with NPTS and DT in any of its forms, then the values.
+    """Read a PEER .AT2 file: header lines, one of them with NPTS and DT, then the values.
 
-    The unit is the header's ("UNITS OF G"), g where it names none. The values must be as
-    many as the header says.
+    The unit is that of the header ("UNITS OF G"), g without one. The number of values must
+    be that of the header.
     """
     path = Path(path)
     lines = _text(path).splitlines()
@@ -125,8 +126,8 @@ def read_at2(path: str | PathLike[str], *, name: str | None = None) -> GroundMot
         values += _numbers(path, number, line)
     if len(values) != n:
         raise RecordError(
-            f"{path}: the header (line {at + 1}) says {n} values, the file has {len(values)}; "
-            "it is cut off or has been edited: get it again"
+            f"{path}: the header (line {at + 1}) gives {n} values, and the file has {len(values)}; "
+            "it is cut off or has been edited: download it again"
         )
     title = " ".join(lines[1].split()) if at >= 2 else path.stem
     return GroundMotion(dt, np.array(values) * factor, name or title, str(path))
@@ -156,7 +157,7 @@ def _npts_and_dt(path: Path, number: int, line: str) -> tuple[int, float]:
 def _numbers(path: Path, number: int, line: str) -> list[float]:
     """Read one line of values; fixed-width columns may touch ("-.1E-03-.2E-03")."""
     if re.sub(_NUMBER, "", line).strip():
-        raise RecordError(f"{path}, line {number}: '{line.strip()[:60]}' is no line of numbers")
+        raise RecordError(f"{path}, line {number}: '{line.strip()[:60]}' must be a line of numbers")
     found = [float(text.upper().replace("D", "E")) for text in re.findall(_NUMBER, line)]
     if not all(isfinite(v) for v in found):
         raise RecordError(f"{path}, line {number}: '{line.strip()[:60]}' has a value too large for a number")
@@ -176,11 +177,11 @@ def read_columns(
     unit
         of the acceleration: m/s^2, g, cm/s^2, gal, mm/s^2, ft/s^2 or in/s^2
     time_column, column
-        their numbers, from 1, or their names in the last header line
+        their numbers, counted from 1, or their names in the last line of the header
 
-    Lines before the first line of numbers are header. The times must be uniform to
-    2 % of the interval, which allows for their rounding in print; the interval is that
-    of first and last, to 12 digits.
+    Lines before the first line of numbers are the header. The times must be uniform to 2 %
+    of the interval, which allows for their rounding in print; the interval follows from the
+    first and the last time, to 12 digits.
     """
     path = Path(path)
     factor = _factor(unit, f"read_columns({path.name!r})")
@@ -199,9 +200,9 @@ def read_columns(
             if line.strip():
                 header = _header_cells(line)
         elif line.strip():
-            raise RecordError(f"{path}, line {number}: '{line.strip()[:60]}' is no line of numbers")
+            raise RecordError(f"{path}, line {number}: '{line.strip()[:60]}' must be a line of numbers")
     if len(rows) < 2:
-        raise RecordError(f"{path}: {len(rows)} lines of numbers; a record needs two or more")
+        raise RecordError(f"{path}: {len(rows)} lines of numbers; a ground motion needs two or more")
     t = _column(path, rows, numbers, header, time_column)
     values = _column(path, rows, numbers, header, column)
     dt = float(f"{(t[-1] - t[0]) / (t.size - 1):.12g}")
@@ -211,7 +212,7 @@ def read_columns(
         worst = int(steps.argmax()) + 1
         raise RecordError(
             f"{path}, line {numbers[worst]}: the time is not uniform: {t[worst - 1]:g} s to {t[worst]:g} s "
-            f"where the mean interval is {dt:.6g} s; interpolate the record to a uniform time first"
+            f"where the mean interval is {dt:.6g} s; interpolate the values to a uniform time first"
         )
     return GroundMotion(dt, values * factor, name or path.stem, str(path), start=float(t[0]))
 
@@ -233,7 +234,7 @@ def _column(
     for i, cells in enumerate(rows):
         if not 1 <= which <= len(cells):
             raise RecordError(
-                f"{path}, line {numbers[i]}: there is no column {which}, the line has {len(cells)}; "
+                f"{path}, line {numbers[i]}: no column {which}, the line has {len(cells)}; "
                 "columns count from 1"
             )
         found[i] = float(cells[which - 1].upper().replace("D", "E"))
@@ -258,7 +259,7 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise RecordError(f"{path} cannot be read ({error.strerror}); check the path") from error
     if "\0" in text:
-        raise RecordError(f"{path} is no text file; give a PEER .AT2 file or plain columns")
+        raise RecordError(f"{path} is not a text file; give a PEER .AT2 file or plain columns")
     return text
 
 
@@ -282,10 +283,10 @@ def el_centro(component: Literal["270", "180", "up", "chopra"] = "270") -> Groun
 
     The thesis uses another processing of the same event (dt 0.01 s, 40 s, peak 0.215 g)
     and calls its component north-south. The north-south component is the stronger one in
-    every processing, so that label is doubtful: what the thesis has is the weaker, east-
-    west one. The default, 270, is therefore what stands for it: same component, same dt,
-    peak 0.211 g for 0.215 g. The two are different filterings of one trace, so they
-    agree in character, not value by value.
+    every processing, so that label is doubtful: the thesis shows the weaker component,
+    east-west. The default, 270, therefore replaces it: the same component and dt, with a
+    peak of 0.211 g in place of 0.215 g. Both are filtered from one trace, so they agree in
+    character, not value by value.
     """
     if component not in _EL_CENTRO:
         raise RecordError(

@@ -101,6 +101,7 @@ class Recorder:
             "signals": signals,
             "texts": {name: texts[:n] for name, texts in self.texts.items()},
             "units": {str(p): p.unit for p in [*self.recorded, *self.watched]},
+            "definitions": {str(p): p.definition for p in self.recorded if p.definition is not None},
             "statistics": self._statistics(int(self._points[0])),
         }
 

@@ -1,1 +1,1 @@
-"""Participants by name and the connections between their ports."""
+"""Components by name and the connections between their ports."""

@@ -16,16 +16,16 @@ def evaluation_order(
     connections: list[Connection],
     recorded: Iterable[Port],
 ) -> list[dict[str, bool]]:
-    """Order blocks and outputs by dependence, in rounds of what does not depend on each other.
+    """Order blocks and outputs by dependence, in rounds of members that are independent of each other.
 
     feedthrough
-        of every participant that moves: the inputs on which each output depends directly
+        for every component that moves, the inputs on which each output depends directly
     recorded
-        ports that are read, beside those that are connected
+        the ports that are read in addition to those that are connected
 
-    An output that depends on inputs follows their sources; the others come first. So a
-    participant may be read in several rounds: its accelerations after the forces that
-    follow from its displacements. The value tells whether it is read after its inputs.
+    An output that depends on inputs follows their sources; the others come first. A component
+    may therefore be read in several rounds: its accelerations after the forces that follow
+    from its displacements. The value tells whether a component is read after its inputs are set.
     """
     used = [*recorded, *(c.source for c in connections)]
     graph: dict[tuple[str, str], list[tuple[str, str]]] = {(name, ""): [] for name in blocks}

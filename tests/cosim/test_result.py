@@ -141,9 +141,9 @@ def test_what_is_no_result_is_refused(tmp_path, content):
         np.savez(path, x=np.ones(3))
     else:
         path.write_bytes(content)
-    with pytest.raises(RecordError, match=r"is no result that was saved as \.npz"):
+    with pytest.raises(RecordError, match=r"is not a result saved as \.npz"):
         Result.load(path)
-    with pytest.raises(RecordError, match="is no result"):
+    with pytest.raises(RecordError, match="is not a result saved"):
         Result.load(tmp_path / "missing.npz")
     with pytest.raises(RecordError, match=r"choose \.npz or \.csv"):
         simulate(System({"c": Counter()}), step=1.0, stop=1.0).save(tmp_path / "r.xlsx")

@@ -66,7 +66,7 @@ def test_scale_and_stage_times():
 
 def test_a_record_brings_dt_unit_and_start():
     source = RecordSource(GroundMotion(0.5, np.array([1.0, 2.0]), "made", start=0.5))
-    assert source.variables["y"].unit == "m/s2"
+    assert source.variables["y"].unit == "m/s^2"
     assert signal(source, 0.5, 1.5).tolist() == [0, 1, 2, 0]
 
 
@@ -80,7 +80,7 @@ def test_units_are_converted_at_a_connection():
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"record": [1.0, 2.0]}, "without dt"),
+        ({"record": [1.0, 2.0]}, "values need dt"),
         ({"record": [1.0, 2.0], "dt": 0.1, "interpolation": "Linear "}, "did you mean 'linear'"),
         ({"record": [1.0, np.nan], "dt": 0.1}, "not a number"),
         ({"record": [1.0, 2.0], "dt": 0.0}, "outside its bounds"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim import FMU, Block, Input, Output, System, WiringError, simulate
+from cosim import FMU, Block, Input, Output, Result, System, WiringError, simulate
 from tests.cosim.fmi.probe import description2, description3, write_fmu
 
 SOURCES = {"2.0": ("probe2.c",), "3.0": ("probe3.c", "rest3.c")}
@@ -70,3 +70,12 @@ def test_a_unit_of_another_kind_is_refused(tmp_path, version):
 def test_start_values_are_converted_by_definition(tmp_path, version):
     path = with_unit(tmp_path / "p.fmu", version, "ton", '<BaseUnit kg="1" factor="1000"/>')
     assert FMU(path, start={"r_in": "500 kg"}).start_values() == {"r_in": [0.5]}
+
+
+@VERSIONS
+def test_results_are_converted_by_definition(tmp_path, version):
+    fmu = FMU(with_unit(tmp_path / "p.fmu", version, "ton", '<BaseUnit kg="1" factor="1000"/>'))
+    result = simulate(System({"p": fmu}), step=0.5, stop=0.5, record=["p.r_out"])
+    result.save(tmp_path / "r.npz")
+    for each in (result, Result.load(tmp_path / "r.npz")):
+        assert each.in_unit("p.r_out", "kg").tolist() == [1000.0, 1000.0]  # r_out = 2 r_in = 1 ton

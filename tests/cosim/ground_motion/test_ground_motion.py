@@ -82,12 +82,12 @@ def test_at2_other_unit(tmp_path):
         (f"{TITLE}{UNITS}no numbers here\n1 2 3\n", "NPTS"),
         (f"{TITLE}{UNITS}NPTS= three, DT= .01\n1 2 3\n", "line 4: cannot read NPTS"),
         (f"{TITLE}{UNITS}NPTS= 3, DT= 0.0 SEC\n1 2 3\n", "above zero"),
-        (f"{TITLE}{UNITS}NPTS= 5, DT= .01 SEC\n1 2 3\n", "says 5 values, the file has 3"),
-        (f"{TITLE}{UNITS}NPTS= 2, DT= .01 SEC\n1 2 3\n", "says 2 values, the file has 3"),
+        (f"{TITLE}{UNITS}NPTS= 5, DT= .01 SEC\n1 2 3\n", "gives 5 values, and the file has 3"),
+        (f"{TITLE}{UNITS}NPTS= 2, DT= .01 SEC\n1 2 3\n", "gives 2 values, and the file has 3"),
         (f"{TITLE}{UNITS}NPTS= 3, DT= .01 SEC\n1 2\nx3\n", "line 6: 'x3'"),
         (f"{TITLE}{UNITS}NPTS= 3, DT= .01 SEC\n1 2 1E999\n", "too large"),
         (f"{TITLE}IN UNITS OF CM/S\nNPTS= 3, DT= .01 SEC\n1 2 3\n", "unit 'cm/s' is not known; did you mean"),
-        ("\0\1\2NPTS", "no text file"),
+        ("\0\1\2NPTS", "not a text file"),
     ],
 )
 def test_at2_refuses(tmp_path, text, expected):
@@ -147,7 +147,7 @@ def test_rounded_times_are_uniform(tmp_path):
         ("0 1\n", "1 lines of numbers"),
         ("", "0 lines of numbers"),
         ("0 1\n1 2\noops\n3 4\n", "line 3: 'oops'"),
-        ("0 1\n1 2\n2\n", "line 3: there is no column 2"),
+        ("0 1\n1 2\n2\n", "line 3: no column 2"),
         ("0 1\n1 1e400\n2 3\n", "line 2: a value is too large"),
         ("0 nan\n1 nan\n", "lines of numbers"),
     ],
@@ -212,7 +212,7 @@ def test_band_limited_resampling_keeps_what_is_below():
         (0.01, "cubic", "not known"),
         (0.0, "linear", "above zero"),
         (float("nan"), "linear", "above zero"),
-        (0.02 / np.pi, "band-limited", "no ratio of whole numbers"),
+        (0.02 / np.pi, "band-limited", "must be a ratio of whole numbers"),
     ],
 )
 def test_resample_refuses(dt, method, text):

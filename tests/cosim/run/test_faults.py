@@ -341,7 +341,7 @@ def define(name: str, base: type = Block, **members):
 def test_declarations_that_cannot_work_are_refused():
     with pytest.raises(DeclarationError, match=r"A\.step: write it as def step\(self, t, h\)"):
         define("A", step=lambda self: None)
-    with pytest.raises(DeclarationError, match=r"A: 'step' is a name of structcosim's own"):
+    with pytest.raises(DeclarationError, match=r"A: 'step' is a name of the base class"):
         define("A", step=Output())
     with pytest.raises(DeclarationError, match="A: 'memory' is a name"):
         define("A", memory=State())
@@ -349,7 +349,7 @@ def test_declarations_that_cannot_work_are_refused():
         define("A", Continuous, x=State(), der_x=Output())
     with pytest.raises(DeclarationError, match="derive from Continuous"):
         define("A", derivatives=lambda self, t: None)
-    with pytest.raises(DeclarationError, match=r"A\.u: its meaning is 1\.0.*start="):
+    with pytest.raises(DeclarationError, match=r"A\.u: its meaning 1\.0 must be a text.*start="):
         define("A", u=Input(1.0))
     with pytest.raises(DeclarationError, match=r"A has no step\(self, t, h\)"):
         define("A")()

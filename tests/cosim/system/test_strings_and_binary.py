@@ -71,7 +71,7 @@ def test_recording_decimation_saving_and_going_on(path, tmp_path):
         assert simulation.run(8 * H).texts["b.echo"] == ["Grüße!!"] * 3
     result.save(tmp_path / "r.npz")
     assert Result.load(tmp_path / "r.npz").texts == result.texts
-    with pytest.raises(WiringError, match=r"c\.echo is text; it is in result\.texts\['c\.echo'\]"):
+    with pytest.raises(WiringError, match=r"c\.echo is a String or Binary; use result\.texts\['c\.echo'\]"):
         result["c.echo"]
 
 
