@@ -1,6 +1,7 @@
-"""The benchmarks' own data, for comparison: in the folder that BENCHMARK_DATA names, or nowhere.
+"""The benchmarks' own data, for comparison, in the folder that BENCHMARK_DATA names.
 
-Not part of the project. `tall_building/mck.npz` and `highway_bridge/` are what is looked for.
+The data is not part of the project: `tall_building/mck.npz`, and the files in `highway_bridge/`.
+Without the variable, tests that need them are skipped.
 """
 
 import os
