@@ -1,7 +1,7 @@
-"""Errors that say where, what, and what to do about it.
+"""Errors that say where, what, and what to do about it; and warnings.
 
-Every error that a user can cause derives from `CosimError`. The command line
-prints its text and ends with exit code 2; a traceback means a defect of ours.
+Every error that a user can cause derives from `CosimError`. The command line prints its
+text and ends with exit code 2; a traceback means a defect of structcosim itself.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class DeclarationError(CosimError):
 
 
 class WiringError(CosimError):
-    """Ports that cannot be connected: unknown name, other shape, other unit, or a cycle."""
+    """Ports that cannot be connected: unknown name, different shape, incompatible unit, or a cycle."""
 
 
 class CompilationError(CosimError):
@@ -31,7 +31,7 @@ class FMUError(CosimError):
 
 
 class RecordError(CosimError):
-    """A record file that cannot be read."""
+    """A ground motion, table or result file that cannot be read or written."""
 
 
 class TimeError(CosimError):
@@ -46,11 +46,19 @@ class SimulationEndedWarning(UserWarning):
     """A participant asked to end the run before its stop time: a normal end; see `Result.ended`."""
 
 
+class CompiledKernelsWarning(UserWarning):
+    """A block runs as a Python callback because Numba cannot compile it."""
+
+
+class LateEventWarning(UserWarning):
+    """An event was handled at the end of the step in which it occurs."""
+
+
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:
-    """Return "; did you mean 'x'? (candidates)" for an unknown name."""
+    """Return "; did you mean 'x'? (available: ...)" for an unknown name."""
     known = list(candidates)
     lowered = {k.lower(): k for k in known}
     close = get_close_matches(str(name).lower(), lowered, n=1, cutoff=0.6)
     hint = f"; did you mean '{lowered[close[0]]}'?" if close else ""
     shown = ", ".join(known[:20]) + (f", ... ({len(known)} in all)" if len(known) > 20 else "")
-    return f"{hint} (there are: {shown or 'none'})"
+    return f"{hint} (available: {shown or 'none'})"

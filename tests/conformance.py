@@ -107,7 +107,7 @@ TABLE: dict[str, list[Row]] = {
             "probe, metronome",
             [
                 f"{F3}::test_units_strings_and_dependencies",
-                "cosim/system/test_text_ports.py::test_texts_of_both_versions",
+                "cosim/system/test_strings_and_binary.py::test_texts_of_both_versions",
             ],
         ),
         only3(
@@ -115,7 +115,7 @@ TABLE: dict[str, list[Row]] = {
             "probe, metronome",
             [
                 f"{F3}::test_binary_start_values",
-                "cosim/system/test_text_ports.py::test_texts_go_from_fmu_to_fmu",
+                "cosim/system/test_strings_and_binary.py::test_texts_go_from_fmu_to_fmu",
             ],
         ),
         only3(

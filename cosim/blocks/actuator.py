@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block, Continuous
-from ..core.variables import Array, Input, Output, Parameter, State
+from ..core.variables import Input, Output, Parameter, State
 from ..functions import clip
-from .checks import length, set_unit
 
 
 class Saturation(Block):
     """y = u limited to [-limit, limit]"""
 
-    limit = Parameter(1.0, "largest magnitude", shape="n", min=0.0)
-    u = Input("command", shape="n")
-    y = Output("limited command", shape="n")
+    DEFAULT_SIZES = {"n": 1}
+
+    limit = Parameter(1.0, "largest magnitude", unit="$unit", shape="n", min=0.0)
+    u = Input("command", unit="$unit", shape="n")
+    y = Output("limited command", unit="$unit", shape="n")
 
     def __init__(self, limit: ArrayLike, *, n: int | None = None, unit: str | None = "N") -> None:
-        super().__init__(limit=limit, n=length("Saturation", n, limit))
-        set_unit(self, unit, "limit", "u", "y")
+        super().__init__(limit=limit, n=n, unit=unit)
 
     def step(self, t: float, h: float) -> None:
         for i in range(self.y.shape[0]):
@@ -38,16 +37,15 @@ class FirstOrderActuator(Continuous):
         F(t + h) = F(t) + (1 - e^(-h / tau)) (sat u - F(t))
     """
 
+    DEFAULT_SIZES = {"n": 1}
+
     tau = Parameter(0.01, "time constant", unit="s", min=1e-12)
     limit = Parameter(1.0, "largest force", unit="N", shape="n", min=0.0)
     u = Input("command", unit="N", shape="n")
     F = State(0.0, "force", unit="N", shape="n")
 
-    if TYPE_CHECKING:
-        der_F: Array
-
     def __init__(self, tau: float, limit: ArrayLike = math.inf, *, n: int | None = None) -> None:
-        super().__init__(tau=tau, limit=limit, n=length("FirstOrderActuator", n, limit))
+        super().__init__(tau=tau, limit=limit, n=n)
 
     def derivatives(self, t: float) -> None:
         for i in range(self.F.shape[0]):

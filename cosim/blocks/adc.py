@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Unpack
 
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block
 from ..core.variables import Input, Output, Parameter
 from ..functions import clip
-from .checks import length, set_unit, whole
+from .options import SampledSignal
 
 
 class AnalogToDigital(Block):
@@ -23,30 +24,15 @@ class AnalogToDigital(Block):
     level is one q below full scale.
     """
 
-    full_scale = Parameter(1.0, "range is [-full_scale, full_scale)", shape="n", min=1e-300)
-    bits = Parameter(16.0, "number of bits", min=1.0, max=52.0)
-    u = Input("analogue signal", shape="n")
-    y = Output("quantised signal", shape="n")
+    DEFAULT_SIZES = {"n": 1}
 
-    def __init__(
-        self,
-        full_scale: ArrayLike,
-        *,
-        bits: int = 16,
-        n: int | None = None,
-        unit: str | None = None,
-        every: int | None = None,
-        sample_period: float | None = None,
-    ) -> None:
-        where = "AnalogToDigital"
-        super().__init__(
-            every=every,
-            sample_period=sample_period,
-            full_scale=full_scale,
-            bits=whole(bits, f"{where}: bits", 1, 52),
-            n=length(where, n, full_scale),
-        )
-        set_unit(self, unit, "u", "y", "full_scale")
+    full_scale = Parameter(1.0, "range is [-full_scale, full_scale)", unit="$unit", shape="n", min=1e-300)
+    bits = Parameter(16.0, "number of bits", min=1.0, max=52.0, whole=True)
+    u = Input("analogue signal", unit="$unit", shape="n")
+    y = Output("quantised signal", unit="$unit", shape="n")
+
+    def __init__(self, full_scale: ArrayLike, *, bits: int = 16, **options: Unpack[SampledSignal]) -> None:
+        super().__init__(full_scale=full_scale, bits=bits, **options)
 
     def step(self, t: float, h: float) -> None:
         levels = 2.0 ** (self.bits - 1.0)

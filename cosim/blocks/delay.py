@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Unpack
+
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block
 from ..core.variables import Input, Local, Output, Parameter
-from .checks import length, set_unit, whole
+from .options import SampledSignal
 
 
 class Delay(Block):
@@ -17,31 +19,16 @@ class Delay(Block):
     a sample period; give it one.
     """
 
-    initial = Parameter(0.0, "output until the first input arrives", shape="n")
-    u = Input("signal", shape="n")
-    y = Output("delayed signal", shape="n")
+    DEFAULT_SIZES = {"n": 1}
+
+    initial = Parameter(0.0, "output until the first input arrives", unit="$unit", shape="n")
+    u = Input("signal", unit="$unit", shape="n")
+    y = Output("delayed signal", unit="$unit", shape="n")
     buffer = Local(0.0, "the last inputs, a ring", shape=("steps", "n"))
     place = Local(0.0, "row of the oldest input")
 
-    def __init__(
-        self,
-        steps: int,
-        *,
-        initial: ArrayLike = 0.0,
-        n: int | None = None,
-        unit: str | None = None,
-        every: int | None = None,
-        sample_period: float | None = None,
-    ) -> None:
-        super().__init__(
-            every=every,
-            sample_period=sample_period,
-            steps=whole(steps, "Delay: steps", 1),
-            initial=initial,
-            y=initial,
-            n=length("Delay", n, initial),
-        )
-        set_unit(self, unit, "u", "y", "initial")
+    def __init__(self, steps: int, *, initial: ArrayLike = 0.0, **options: Unpack[SampledSignal]) -> None:
+        super().__init__(steps=steps, initial=initial, y=initial, **options)
 
     def initialize(self) -> None:
         for i in range(self.buffer.shape[0]):

@@ -12,32 +12,28 @@ In the ports u is the signal and y the filtered one, u_f.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Unpack
 
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block, Continuous
-from ..core.variables import Array, Input, Local, Output, Parameter, State
-from .checks import length, set_unit
+from ..core.variables import Input, Local, Output, Parameter, State
+from .options import SampledSignal, Signal
 
 
 class LowPass(Continuous):
     """(2.17) as a continuous participant: under sampled coupling exact over a step, from u_k to y_{k+1}."""
 
+    DEFAULT_SIZES = {"n": 1}
+
     tau = Parameter(0.1, "time constant", unit="s", min=1e-12)
-    u = Input("signal", shape="n")
-    y = State(0.0, "filtered signal", shape="n")
+    u = Input("signal", unit="$unit", shape="n")
+    y = State(0.0, "filtered signal", unit="$unit", shape="n")
     held = Local(0.0, "step for which approach is valid", unit="s")
     approach = Local(0.0, "1 - e^(-h / tau)")
 
-    if TYPE_CHECKING:
-        der_y: Array
-
-    def __init__(
-        self, tau: float = 0.1, *, y: ArrayLike = 0.0, n: int | None = None, unit: str | None = None
-    ) -> None:
-        super().__init__(tau=tau, y=y, n=length("LowPass", n, y))
-        set_unit(self, unit, "u", "y")
+    def __init__(self, tau: float = 0.1, *, y: ArrayLike = 0.0, **options: Unpack[Signal]) -> None:
+        super().__init__(tau=tau, y=y, **options)
 
     def derivatives(self, t: float) -> None:
         for i in range(self.y.shape[0]):
@@ -59,27 +55,17 @@ class DiscreteLowPass(Block):
     differences of the times are. y_0 is the start value.
     """
 
+    DEFAULT_SIZES = {"n": 1}
+
     tau = Parameter(0.1, "time constant", unit="s", min=1e-12)
-    u = Input("signal", shape="n")
-    y = Output("filtered signal", shape="n")
-    held = Local(0.0, "signal at the call before", shape="n")
+    u = Input("signal", unit="$unit", shape="n")
+    y = Output("filtered signal", unit="$unit", shape="n")
+    held = Local(0.0, "signal at the call before", unit="$unit", shape="n")
     before = Local(0.0, "time of the call before", unit="s")
     called = Local(0.0, "1 after the first call")
 
-    def __init__(
-        self,
-        tau: float = 0.1,
-        *,
-        y: ArrayLike = 0.0,
-        n: int | None = None,
-        unit: str | None = None,
-        every: int | None = None,
-        sample_period: float | None = None,
-    ) -> None:
-        super().__init__(
-            every=every, sample_period=sample_period, tau=tau, y=y, n=length("DiscreteLowPass", n, y)
-        )
-        set_unit(self, unit, "u", "y")
+    def __init__(self, tau: float = 0.1, *, y: ArrayLike = 0.0, **options: Unpack[SampledSignal]) -> None:
+        super().__init__(tau=tau, y=y, **options)
 
     def step(self, t: float, h: float) -> None:
         approach = -math.expm1(-(t - self.before) / self.tau) if self.called > 0.0 else 0.0

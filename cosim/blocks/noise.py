@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Unpack
 
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block
 from ..core.variables import Input, Local, Output, Parameter
-from .checks import length, set_unit, whole
+from .options import Signal
 from .random_stream import normal, seed_streams
 
 
@@ -19,30 +20,19 @@ class MeasurementNoise(Block):
     whose noise is to be independent of another's takes another seed.
     """
 
-    sigma = Parameter(1.0, "standard deviation", shape="n", min=0.0)
-    seed = Parameter(1.0, "seed, a whole number", min=0.0, max=2.0**53)
-    u = Input("true signal", shape="n")
-    y = Output("measured signal", shape="n")
+    DEFAULT_SIZES = {"n": 1}
+
+    sigma = Parameter(1.0, "standard deviation", unit="$unit", shape="n", min=0.0)
+    seed = Parameter(1.0, "seed, a whole number", min=0.0, max=2.0**53, whole=True)
+    u = Input("true signal", unit="$unit", shape="n")
+    y = Output("measured signal", unit="$unit", shape="n")
     streams = Local(0.0, "state of the generators", shape=("n", 6))
     work = Local(0.0, "working memory of the seeding", shape=(3, 3, 3))
 
     def __init__(
-        self,
-        sigma: ArrayLike,
-        *,
-        sample_period: float,
-        seed: int = 1,
-        n: int | None = None,
-        unit: str | None = None,
+        self, sigma: ArrayLike, *, sample_period: float, seed: int = 1, **options: Unpack[Signal]
     ) -> None:
-        where = "MeasurementNoise"
-        super().__init__(
-            sample_period=sample_period,
-            sigma=sigma,
-            seed=whole(seed, f"{where}: seed", 0),
-            n=length(where, n, sigma),
-        )
-        set_unit(self, unit, "u", "y", "sigma")
+        super().__init__(sample_period=sample_period, sigma=sigma, seed=seed, **options)
 
     def initialize(self) -> None:
         seed_streams(math.floor(self.seed) * 1.0, self.streams, self.work)

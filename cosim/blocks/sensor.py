@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from ..core.participant import Continuous, LinearContinuous
 from ..core.variables import Array, Input, Local, Output, Parameter, State
 from ..errors import DeclarationError
 from ..functions import dot
-from .checks import length, set_unit
+from .options import Signal
 
 
 class SensorDynamics(Continuous):
@@ -26,21 +26,17 @@ class SensorDynamics(Continuous):
         z(t + h) = e^-r ((1 - r) z - r e / mu)
     """
 
+    DEFAULT_SIZES = {"n": 1}
+
     mu = Parameter(0.008, "time constant", unit="s", min=1e-12)
-    u = Input("true signal", shape="n")
-    y = State(0.0, "measured signal", shape="n")
-    z = State(0.0, "its rate", shape="n")
+    u = Input("true signal", unit="$unit", shape="n")
+    y = State(0.0, "measured signal", unit="$unit", shape="n")
+    z = State(0.0, "its rate", unit="($unit)/s", shape="n")
     held = Local(0.0, "step for which decay is valid", unit="s")
     decay = Local(0.0, "e^(-h / mu)")
 
-    if TYPE_CHECKING:
-        der_y: Array
-        der_z: Array
-
-    def __init__(self, mu: float = 0.008, *, n: int = 1, unit: str | None = None) -> None:
-        super().__init__(mu=mu, n=length("SensorDynamics", n))
-        set_unit(self, unit, "u", "y")
-        set_unit(self, None if unit is None else f"({unit})/s", "z")
+    def __init__(self, mu: float = 0.008, **options: Unpack[Signal]) -> None:
+        super().__init__(mu=mu, **options)
 
     def derivatives(self, t: float) -> None:
         for i in range(self.y.shape[0]):
@@ -64,16 +60,12 @@ class StrictlyProper(LinearContinuous):
     A = Parameter(0.0, "dynamics", shape=("n", "n"), fixed=True)
     B = Parameter(0.0, "input", shape=("n", "m"), fixed=True)
     C = Parameter(0.0, "output", shape=("p", "n"), fixed=True)
-    u = Input("true signal", shape="m")
+    u = Input("true signal", unit="$unit", shape="m")
     x = State(0.0, "state", shape="n")
-    y = Output("measured signal", shape="p")
-
-    if TYPE_CHECKING:
-        der_x: Array
+    y = Output("measured signal", unit="$unit", shape="p")
 
     def __init__(self, A: ArrayLike, B: ArrayLike, C: ArrayLike, *, unit: str | None = None) -> None:
-        super().__init__(A=A, B=B, C=C)
-        set_unit(self, unit, "u", "y")
+        super().__init__(A=A, B=B, C=C, unit=unit)
 
     def derivatives(self, t: float) -> None:
         for i in range(self.x.shape[0]):
@@ -91,18 +83,14 @@ class StateSpace(LinearContinuous):
     B = Parameter(0.0, "input", shape=("n", "m"), fixed=True)
     C = Parameter(0.0, "output", shape=("p", "n"), fixed=True)
     D = Parameter(0.0, "direct path", shape=("p", "m"), fixed=True)
-    u = Input("true signal", shape="m")
+    u = Input("true signal", unit="$unit", shape="m")
     x = State(0.0, "state", shape="n")
-    y = Output("measured signal", shape="p")
-
-    if TYPE_CHECKING:
-        der_x: Array
+    y = Output("measured signal", unit="$unit", shape="p")
 
     def __init__(
         self, A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, *, unit: str | None = None
     ) -> None:
-        super().__init__(A=A, B=B, C=C, D=D)
-        set_unit(self, unit, "u", "y")
+        super().__init__(A=A, B=B, C=C, D=D, unit=unit)
 
     def derivatives(self, t: float) -> None:
         for i in range(self.x.shape[0]):

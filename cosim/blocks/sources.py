@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import types
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,20 +14,19 @@ from ..core.participant import Block
 from ..core.variables import Local, Output, Parameter
 from ..errors import DeclarationError, did_you_mean
 from ..ground_motion.ground_motion import GroundMotion
-from .checks import length, set_unit, whole
+from .options import Sampled, Signal
 from .random_stream import normal, seed_streams
 
 
 class Constant(Block):
     """y = value, for a number or a vector."""
 
-    value = Parameter(0.0, "value", shape="n")
-    y = Output("signal", shape="n")
+    value = Parameter(0.0, "value", unit="$unit", shape="n")
+    y = Output("signal", unit="$unit", shape="n")
 
     def __init__(self, value: ArrayLike = 0.0, *, unit: str | None = None) -> None:
         given = np.atleast_1d(np.asarray(value, dtype=np.float64))
-        super().__init__(value=given, y=given)
-        set_unit(self, unit, "value", "y")
+        super().__init__(value=given, y=given, unit=unit)
 
     def step(self, t: float, h: float) -> None:
         for i in range(self.y.shape[0]):
@@ -51,7 +50,7 @@ class RecordSource(Block):
     start = Parameter(0.0, "time of the first value", unit="s")
     scale = Parameter(1.0, "factor on the record")
     linear = Parameter(1.0, "1: linear interpolation, 0: hold", min=0.0, max=1.0, fixed=True)
-    y = Output("signal")
+    y = Output("signal", unit="$unit")
 
     def __init__(
         self,
@@ -62,8 +61,7 @@ class RecordSource(Block):
         scale: float = 1.0,
         start: float | None = None,
         unit: str | None = None,
-        every: int | None = None,
-        sample_period: float | None = None,
+        **sampled: Unpack[Sampled],
     ) -> None:
         """Take a GroundMotion (its dt, unit and start), or values with dt and unit."""
         if interpolation not in ("linear", "hold"):
@@ -82,15 +80,14 @@ class RecordSource(Block):
         if dt is None:
             raise DeclarationError("RecordSource: values without dt; give the sample interval in s")
         super().__init__(
-            every=every,
-            sample_period=sample_period,
             values=values,
             dt=dt,
             start=start or 0.0,
             scale=scale,
             linear=float(interpolation == "linear"),
+            unit=unit,
+            **sampled,
         )
-        set_unit(self, unit, "y")
 
     def step(self, t: float, h: float) -> None:
         n = self.values.shape[0]
@@ -117,18 +114,14 @@ def f(t: float) -> float:
 class _FunctionOfTime(Block):
     """y = f(t)"""
 
-    y = Output("signal")
+    y = Output("signal", unit="$unit")
 
     def step(self, t: float, h: float) -> None:
         self.y = f(t)
 
 
 def function_source(
-    function: Callable[[float], float],
-    *,
-    unit: str | None = None,
-    every: int | None = None,
-    sample_period: float | None = None,
+    function: Callable[[float], float], *, unit: str | None = None, **sampled: Unpack[Sampled]
 ) -> Block:
     """Return a block with y = function(t), for any function of time in s that gives a number.
 
@@ -142,9 +135,9 @@ def function_source(
     template = _FunctionOfTime.step
     step = types.FunctionType(template.__code__, {**template.__globals__, "f": function}, "step")
     name = "FunctionSource"
-    made: Any = type(name, (Block,), {"y": Output("signal"), "step": step, "__doc__": "y = f(t)"})
-    block: Block = made(every=every, sample_period=sample_period)
-    set_unit(block, unit, "y")
+    y = Output("signal", unit="$unit")
+    made: Any = type(name, (Block,), {"y": y, "step": step, "__doc__": "y = f(t)"})
+    block: Block = made(unit=unit, **sampled)
     return block
 
 
@@ -157,10 +150,12 @@ class WhiteNoise(Block):
     the coupling, the machine's random state, or on how many elements there are.
     """
 
-    mean = Parameter(0.0, "mean", shape="n")
-    sigma = Parameter(1.0, "standard deviation", shape="n", min=0.0)
-    seed = Parameter(1.0, "seed, a whole number", min=0.0, max=2.0**53)
-    y = Output("noise", shape="n")
+    DEFAULT_SIZES = {"n": 1}
+
+    mean = Parameter(0.0, "mean", unit="$unit", shape="n")
+    sigma = Parameter(1.0, "standard deviation", unit="$unit", shape="n", min=0.0)
+    seed = Parameter(1.0, "seed, a whole number", min=0.0, max=2.0**53, whole=True)
+    y = Output("noise", unit="$unit", shape="n")
     streams = Local(0.0, "state of the generators", shape=("n", 6))
     work = Local(0.0, "working memory of the seeding", shape=(3, 3, 3))
 
@@ -171,14 +166,9 @@ class WhiteNoise(Block):
         seed: int = 1,
         sigma: ArrayLike = 1.0,
         mean: ArrayLike = 0.0,
-        n: int | None = None,
-        unit: str | None = None,
+        **options: Unpack[Signal],
     ) -> None:
-        """n elements: as many as sigma or mean have, otherwise 1."""
-        values: dict[str, Any] = {"sigma": sigma, "mean": mean, "seed": whole(seed, "WhiteNoise: seed", 0)}
-        values["n"] = length("WhiteNoise", n, sigma, mean)
-        super().__init__(sample_period=sample_period, **values)
-        set_unit(self, unit, "y", "sigma", "mean")
+        super().__init__(sample_period=sample_period, seed=seed, sigma=sigma, mean=mean, **options)
 
     def initialize(self) -> None:
         seed_streams(math.floor(self.seed) * 1.0, self.streams, self.work)

@@ -1,16 +1,17 @@
-"""A table as a signal: rows at any instants."""
+"""A table as a signal: rows at any instants, or at a constant interval."""
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import Literal, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.participant import Block
-from ..core.variables import Output, Parameter
+from ..core.variables import Array, Output, Parameter
 from ..errors import DeclarationError, did_you_mean
-from .checks import set_unit
+from .options import Sampled
 
 
 class TableSource(Block):
@@ -18,16 +19,21 @@ class TableSource(Block):
 
         i = the last one with t_i <= t
         hold:    y = v_i
-        linear:  y = v_i + (t - t_i) / (t_{i+1} - t_i) (v_{i+1} - v_i)
+        linear:  y = v_i + q (v_{i+1} - v_i),  q = (t - t_i) / (t_{i+1} - t_i)
 
     Two rows at one instant are a jump: the second counts there. An instant that is less
     than 1e-9 of a step after t is at t.
+
+    At a constant interval, t_i = i interval, the row is found by division:
+
+        i = floor(t / interval + 1e-9) limited to [0, n - 2],  q = t / interval - i
     """
 
     instants = Parameter(0.0, "instants of the rows", unit="s", shape="n_rows", fixed=True)
-    rows = Parameter(0.0, "values at the instants", shape=("n_rows", "n"), fixed=True)
+    interval = Parameter(0.0, "constant interval of the rows; 0: none", unit="s", min=0.0, fixed=True)
+    rows = Parameter(0.0, "values at the instants", unit="$unit", shape=("n_rows", "n"), fixed=True)
     linear = Parameter(1.0, "1: linear interpolation, 0: hold", min=0.0, max=1.0, fixed=True)
-    y = Output("signal", shape="n")
+    y = Output("signal", unit="$unit", shape="n")
 
     def __init__(
         self,
@@ -36,13 +42,21 @@ class TableSource(Block):
         *,
         interpolation: Literal["linear", "hold"] = "linear",
         unit: str | None = None,
+        **sampled: Unpack[Sampled],
     ) -> None:
-        """Take (n,) instants in s that do not decrease, and (n,) or (n, m) values."""
+        """Take (n,) instants in s that do not decrease, or one interval, and (n,) or (n, m) values."""
         if interpolation not in ("linear", "hold"):
             hint = did_you_mean(str(interpolation), ["linear", "hold"])
             raise DeclarationError(f"TableSource: interpolation '{interpolation}' is not known{hint}")
-        t, v = np.asarray(instants, dtype=np.float64), np.asarray(rows, dtype=np.float64)
+        t: Array = np.asarray(instants, dtype=np.float64)
+        v: Array = np.asarray(rows, dtype=np.float64)
         v = v[:, None] if v.ndim == 1 else v
+        interval = 0.0
+        if t.ndim == 0:
+            interval = float(t)
+            if not (math.isfinite(interval) and interval > 0.0):
+                raise DeclarationError(f"TableSource: the interval of {interval} s must be above zero")
+            t = np.asarray(interval * np.arange(len(v) if v.ndim else 0))
         if t.ndim != 1 or v.ndim != 2 or len(t) != len(v) or len(t) == 0:
             raise DeclarationError(
                 f"TableSource: instants of shape {t.shape} and rows of shape {v.shape} do not fit; "
@@ -50,21 +64,31 @@ class TableSource(Block):
             )
         if not (np.isfinite(t).all() and np.isfinite(v).all() and (np.diff(t) >= 0.0).all()):
             raise DeclarationError("TableSource: give finite values, at instants that do not decrease")
-        super().__init__(instants=t, rows=v, linear=float(interpolation == "linear"), n=v.shape[1])
-        set_unit(self, unit, "y", "rows")
+        linear = float(interpolation == "linear")
+        super().__init__(instants=t, interval=interval, rows=v, linear=linear, unit=unit, **sampled)
 
     def step(self, t: float, h: float) -> None:
-        now = t + 1e-9 * h
-        low, high = 0, self.instants.shape[0]  # the last row at or before now is below `high`
-        while high - low > 1:
-            middle = (low + high) // 2
-            if self.instants[middle] <= now:
-                low = middle
-            else:
-                high = middle
+        n = self.instants.shape[0]
+        low, high = 0, n  # the last row at or before now is below `high`
         q = 0.0
-        if self.linear != 0.0 and high < self.instants.shape[0] and t > self.instants[low]:
-            q = (t - self.instants[low]) / (self.instants[high] - self.instants[low])
+        if self.interval > 0.0:
+            place = min(t / self.interval, n - 1.0) if t > 0.0 else 0.0
+            if self.linear != 0.0:
+                low = max(min(math.floor(place + 1e-9), n - 2), 0)
+                q = place - low
+            else:
+                low = min(math.floor(place + 1e-9), n - 1)
+            high = low + 1
+        else:
+            now = t + 1e-9 * h
+            while high - low > 1:
+                middle = (low + high) // 2
+                if self.instants[middle] <= now:
+                    low = middle
+                else:
+                    high = middle
+            if self.linear != 0.0 and high < n and t > self.instants[low]:
+                q = (t - self.instants[low]) / (self.instants[high] - self.instants[low])
         for i in range(self.y.shape[0]):
             v = self.rows[low, i]
             self.y[i] = v if q == 0.0 else v + q * (self.rows[high, i] - v)

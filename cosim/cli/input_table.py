@@ -98,7 +98,7 @@ def _check_input(path: Path, fmu: FMU, name: str) -> None:
             f"{path}: {name} is a {variable.type}, and inputs over time are numbers; "
             "leave the column out and give it a start value"
         )
-    if fmu.aliases.get(name, name).partition("[")[0] not in fmu.inputs and name not in fmu.inputs:
+    if name.partition("[")[0] not in fmu.inputs and name not in fmu.inputs:
         raise RecordError(f"{path}: {fmu.path.name} has no input '{name}'" + did_you_mean(name, fmu.inputs))
 
 

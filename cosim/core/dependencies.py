@@ -1,4 +1,8 @@
-"""Which outputs depend on which inputs: read off the source code of the kernels.
+"""Which outputs depend on which inputs (feedthrough): read off the source code of the kernels.
+
+A run orders its evaluation by this answer (stage coupling, algebraic cycles): it holds for every
+value of the parameters, and needs no compilation. The model structure of an exported FMU refines
+it by element, for the parameters as they are: fmus/export/dependencies.py.
 
 The answer is a superset, by variable: assignments are followed without regard to their
 order, a condition counts for everything assigned under it (for everything, where it
@@ -16,10 +20,9 @@ import textwrap
 import types
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from .participant import Participant
+from .participant import Participant
 
 _EVALUATION = ("derivatives", "outputs", "step")
 _VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}

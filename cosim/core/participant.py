@@ -18,13 +18,15 @@ import copy
 import math
 from collections.abc import Callable, Mapping
 from numbers import Real
-from typing import Any, ClassVar
+from types import NoneType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ..errors import DeclarationError, did_you_mean
 from ..functions import integrate_ode4, linear_hold
-from .variables import KINDS, Array, Local, Parameter, Variable
+from .port import Direction, Port
+from .variables import KINDS, Array, Local, Parameter, Variable, whole_number
 
 #: kernels, and how many of (t, h) each takes
 KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
@@ -34,14 +36,6 @@ _BOUND = {"memory", "variables", "zones", "_views", *_VECTORS}
 _RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
 #: size names that a Continuous works out itself
 _AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
-
-
-def whole_number(what: str, value: Any) -> int:
-    """Return a number that has to be whole and above zero as an int."""
-    number = float(value) if isinstance(value, Real) else math.nan
-    if not (number.is_integer() and number >= 1.0):
-        raise DeclarationError(f"{what}={value!r} is no whole number, 1 or more")
-    return int(number)
 
 
 def _copied(value: Any) -> Any:
@@ -74,7 +68,15 @@ class Participant:
     compiled: ClassVar[bool] = True
     #: locals that name the step for which matrices are kept; 0 in them makes `advance` compute anew
     CACHE_KEYS: ClassVar[tuple[str, ...]] = ()
+    #: sizes by name that are neither given nor those of a given array
+    DEFAULT_SIZES: ClassVar[Mapping[str, int]] = {}
+    #: see component.py, whose contract every participant keeps
+    as_block: bool = False
+    every: int | None = None
+    sample_period: float | None = None
     _declared: ClassVar[dict[str, Variable]] = {}
+    #: the keywords that give a unit
+    _unit_names: ClassVar[set[str]] = set()
 
     input_vector: Array
     state_vector: Array
@@ -89,6 +91,10 @@ class Participant:
                 elif name in declared and not isinstance(value, Variable):
                     del declared[name]
         cls._declared = cls._complete(declared)
+        cls._unit_names = set().union(*(v.unit_names for v in cls._declared.values()))
+        sizes = {n for v in cls._declared.values() for n in v.shape}
+        for name in cls._unit_names & (sizes | cls._declared.keys()):
+            raise DeclarationError(f"{cls.__name__}: '{name}' names a unit and something else; rename one")
         for name, variable in cls._declared.items():
             if cls._is_reserved(name):
                 raise DeclarationError(f"{cls.__name__}: '{name}' is a name of structcosim's own; rename it")
@@ -121,7 +127,11 @@ class Participant:
 
     def __init__(self, **values: Any) -> None:
         sizes = self._sizes(values)
-        self._layout(sizes)
+        units = {name: values.get(name) for name in self._unit_names}
+        for name, unit in units.items():
+            if not isinstance(unit, (str, NoneType)):
+                raise DeclarationError(f"{type(self).__name__}: {name}={unit!r} must be a unit, such as 'N'")
+        self._layout(sizes, units)
         for name, variable in self.variables.items():
             self._assign(variable, values.get(name, variable.start))
 
@@ -135,15 +145,17 @@ class Participant:
         settable = [n for n, v in cls._declared.items() if v.kind not in ("derivative", "local")]
         sizes: dict[str, int] = {}
         for name, value in values.items():
+            if name in cls._unit_names or (name in symbols and value is None):
+                continue
             if name in symbols:
                 sizes[name] = whole_number(f"{where}: size {name}", value)
             elif name not in settable:
                 raise DeclarationError(
                     f"{where} has no parameter or variable '{name}'"
-                    + did_you_mean(name, [*settable, *sorted(symbols)])
+                    + did_you_mean(name, [*settable, *sorted(symbols | cls._unit_names)])
                 )
         for name, value in values.items():
-            if name in symbols or name not in cls._declared:
+            if name not in cls._declared:
                 continue
             shape = cls._declared[name].shape
             given = np.shape(value)
@@ -159,6 +171,7 @@ class Participant:
                     raise DeclarationError(
                         f"{where}.{name}: shape {given} does not fit {shape}: {symbol} is {wanted}, not {n}"
                     )
+        sizes = {n: size for n, size in cls.DEFAULT_SIZES.items() if n in symbols} | sizes
         missing = symbols - sizes.keys()
         if missing:
             raise DeclarationError(
@@ -172,8 +185,8 @@ class Participant:
         """Sizes that follow from the others."""
         return {}
 
-    def _layout(self, sizes: Mapping[str, int]) -> None:
-        """Lay the variables into zones and allocate the record."""
+    def _layout(self, sizes: Mapping[str, int], units: Mapping[str, str | None]) -> None:
+        """Lay the variables into zones and allocate the storage."""
         self.variables: dict[str, Variable] = {}
         slot = 0
         zones: dict[str, tuple[int, int]] = {}
@@ -184,7 +197,7 @@ class Participant:
                     shape = tuple(n if isinstance(n, int) else sizes[n] for n in variable.shape)
                     if any(n < 1 for n in shape):
                         raise DeclarationError(f"{type(self).__name__}.{name}: shape {shape} has no elements")
-                    self.variables[name] = variable.resolved(shape, slot)
+                    self.variables[name] = variable.resolved(shape, slot, units)
                     slot += self.variables[name].size
             zones[kind] = (first, slot - first)
         #: first slot and number of slots of each kind
@@ -247,6 +260,8 @@ class Participant:
             raise DeclarationError(
                 f"{where} = {value!r} is outside its bounds [{variable.min:g}, {variable.max:g}]"
             )
+        if variable.whole and (array != np.floor(array)).any():
+            raise DeclarationError(f"{where} = {value!r} must be a whole number")
         self._views[variable.name][...] = array
 
     def fresh(self) -> Participant:
@@ -267,18 +282,28 @@ class Participant:
         for name, value in attributes.items():
             setattr(self, name, _copied(value))
 
+    # ------------------------------------------------------------------- ports
+
+    def ports(self, direction: Direction) -> dict[str, Port]:
+        """Return the inputs, or the outputs and states, as ports."""
+        kinds = ("input",) if direction == "input" else ("output", "state")
+        return {
+            name: Port("", name, v.shape, v.unit, count=v.size)  # type: ignore[arg-type]
+            for name, v in self.variables.items()
+            if v.kind in kinds
+        }
+
+    @property
+    def declared_outputs(self) -> list[str]:
+        """The names of the outputs and states."""
+        return list(self.ports("output"))
+
     # ----------------------------------------------------------------- kernels
 
     @property
     def kernels(self) -> dict[str, Callable[..., None]]:
         """The kernels that this class has, by name."""
         return {name: getattr(type(self), name) for name in self.KERNELS if hasattr(type(self), name)}
-
-    def dependencies(self) -> dict[str, set[str]]:
-        """Which inputs and states each output and derivative depends on (a superset, by variable)."""
-        from .dependencies import dependencies
-
-        return dependencies(self)
 
     def __repr__(self) -> str:
         shown = ", ".join(
@@ -302,9 +327,7 @@ class Block(Participant):
     """
 
     KERNELS = ("initialize", "step")
-
-    every: int | None
-    sample_period: float | None
+    as_block = True
 
     def __init__(
         self, *, every: int | None = None, sample_period: float | None = None, **values: Any
@@ -344,6 +367,12 @@ class Continuous(Participant):
     KERNELS = ("initialize", "derivatives", "outputs", "advance")
 
     derivative_vector: Array
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Stand for `der_x` of every state `x`, whose name a type checker cannot derive."""
+
     max_step = Parameter(np.inf, "largest internal step of advance", unit="s", min=1e-12, fixed=True)
     integrator_work = Local(0.0, "stages of advance", shape=(3, "n_states"))
 

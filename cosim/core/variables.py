@@ -6,18 +6,26 @@
         u = Output("force", unit="N")
 
 Sizes in `shape` are numbers or names ("n"); a name is resolved when the instance
-is made, from the arrays that it is given or from a keyword (`n=3`). A unit of None
-is not checked, "1" is dimensionless. Type checkers see a scalar declaration as
-`float`, one with a shape as an array; on an instance it is that value.
+is made, from the arrays that it is given or from a keyword (`n=3`). Units may have
+names too, with a dollar sign: `unit="$unit"` or `unit="($unit)/s"` is resolved from the
+keyword `unit="N"`. A unit of None is not checked, "1" is dimensionless. Type checkers
+see a scalar declaration as `float`, one with a shape as an array; on an instance it is
+that value.
 """
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DeclarationError
 
 Array: TypeAlias = NDArray[np.float64]
 Size: TypeAlias = int | str
@@ -26,6 +34,15 @@ Kind = Literal["input", "output", "state", "derivative", "local", "parameter"]
 
 #: order of the zones in a record
 KINDS: tuple[Kind, ...] = ("input", "output", "state", "derivative", "local", "parameter")
+_UNIT_NAME = re.compile(r"\$([A-Za-z_]\w*)")
+
+
+def whole_number(what: str, value: Any, least: int = 1) -> int:
+    """Return a whole number that must not be below `least` as an int."""
+    number = float(value) if isinstance(value, Real) else math.nan
+    if not (number.is_integer() and least <= number <= 2.0**53):
+        raise DeclarationError(f"{what}={value!r} must be a whole number, {least} or more")
+    return int(number)
 
 
 @dataclass(frozen=True)
@@ -40,8 +57,14 @@ class Variable:
     min: float = -np.inf
     max: float = np.inf
     fixed: bool = False
+    whole: bool = False
     name: str = ""
     slot: int = -1
+
+    @property
+    def unit_names(self) -> set[str]:
+        """The names in the unit that an instance resolves."""
+        return set(_UNIT_NAME.findall(self.unit or ""))
 
     @property
     def size(self) -> int:
@@ -57,9 +80,13 @@ class Variable:
     def __set__(self, instance: Any, value: Any) -> None:
         instance._set(self.name, value)
 
-    def resolved(self, shape: tuple[int, ...], slot: int) -> Variable:
-        """Return a copy with numbers for its shape and its first slot."""
-        return replace(self, shape=shape, slot=slot)
+    def resolved(self, shape: tuple[int, ...], slot: int, units: Mapping[str, str | None]) -> Variable:
+        """Return a copy with numbers for its shape, its first slot, and units for their names."""
+        unit = self.unit
+        if self.unit_names:
+            known = {name: units.get(name) for name in self.unit_names}
+            unit = None if None in known.values() else _UNIT_NAME.sub(lambda m: str(known[m[1]]), str(unit))
+        return replace(self, shape=shape, slot=slot, unit=unit)
 
 
 def _shape(shape: Shape) -> tuple[Size, ...]:
@@ -75,6 +102,7 @@ def Parameter(
     min: float = ...,
     max: float = ...,
     fixed: bool = ...,
+    whole: bool = ...,
 ) -> float: ...
 @overload
 def Parameter(
@@ -86,6 +114,7 @@ def Parameter(
     min: float = ...,
     max: float = ...,
     fixed: bool = ...,
+    whole: bool = ...,
 ) -> Array: ...
 def Parameter(
     start: ArrayLike = 0.0,
@@ -96,13 +125,14 @@ def Parameter(
     min: float = -np.inf,
     max: float = np.inf,
     fixed: bool = False,
+    whole: bool = False,
 ) -> Any:
     """Declare a parameter: set before the run, constant in it.
 
-    `fixed=True` keeps it out of the interface of an exported FMU (a large matrix,
-    a table): it is part of what the FMU computes with, at the value it has at export.
+    `fixed=True` keeps it out of the interface of an exported FMU (a large matrix, a
+    table): the FMU computes with the value at export. `whole=True` refuses fractions.
     """
-    return Variable("parameter", start, meaning, unit, _shape(shape), min, max, fixed)
+    return Variable("parameter", start, meaning, unit, _shape(shape), min, max, fixed, whole)
 
 
 @overload

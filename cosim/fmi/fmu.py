@@ -3,7 +3,7 @@
     plant = FMU("plant.fmu", start={"m": 2.0})
 
 Arrays are ports with a shape (ports.py). Variables of all numeric types are ports, floats
-to the system; so are clocks (clocks.py), and strings and binary data (text_ports.py). What
+to the system; so are clocks (clocks.py), and strings and binary data. What
 depends on the version of FMI is in fmi2.py and fmi3.py.
 """
 
@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..core.participant import Participant, rate
+from ..core.port import Direction, Port
 from ..core.tableaus import TABLEAUS
 from ..errors import FMUError, did_you_mean
 from ..loop.operations import Number
@@ -31,7 +32,7 @@ from .file.shared_library import library_name
 from .instance.adapter import Adapter
 from .instance.fmi2 import Fmi2
 from .instance.fmi3 import Fmi3
-from .ports import FMUPort, Shape, ports
+from .ports import FMUPort, Shape, ports, single, unit_definitions
 
 Interface = Literal["CoSimulation", "ModelExchange"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4", "cvode"]
@@ -143,8 +144,9 @@ class FMU:
         texts = [v for v in self.variables.values() if v.type in ("String", "Binary")]
         self.text_inputs = {v.name: v for v in texts if v.causality == "input" and v.alias is None}
         self.text_outputs = {v.name: v for v in texts if v.causality in ("output", "local")}
-        self.inputs = {n: (p.shape, p.unit) for n, p in self.input_ports.items()}
-        self.outputs = {n: (p.shape, p.unit) for n, p in self.output_ports.items()}
+        self.inputs = self._as_ports(self.input_ports, self.text_inputs)
+        self.inputs |= {n: self.inputs[of] for n, of in self.aliases.items() if of in self.inputs}
+        self.outputs = self._as_ports(self.output_ports, self.text_outputs)
         #: the outputs proper, without local variables: what is recorded unless it is said
         self.declared_outputs = [
             n for n, p in self.output_ports.items() if p.variables[0].causality == "output"
@@ -156,6 +158,15 @@ class FMU:
                     f"{self.path.name} has no variable '{name}'" + did_you_mean(name, self.variables)
                 )
         self.start_values()
+
+    def ports(self, direction: Direction) -> dict[str, Port]:
+        """Return the inputs with their aliases, or the outputs and local variables, as ports."""
+        return self.inputs if direction == "input" else self.outputs
+
+    def _as_ports(self, numeric: Mapping[str, FMUPort], texts: Mapping[str, Any]) -> dict[str, Port]:
+        definitions = unit_definitions(self.description)
+        all_ports = [*numeric.values(), *(single(v, self.shape_of(v)) for v in texts.values())]
+        return {p.name: p.as_port(definitions) for p in all_ports}
 
     def _check_interfaces(self) -> None:
         if not (self.has_cs or self.has_me):

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
+from ..core.port import Port
 from ..errors import FMUError
+from ..units import BASE_UNITS, Definition
 
 Shape: TypeAlias = tuple[int, ...]
 
@@ -47,6 +49,19 @@ class FMUPort:
         """The number of values."""
         return math.prod(self.shape)
 
+    def as_port(self, definitions: Mapping[str, Definition]) -> Port:
+        """Return the port as a system sees it, with the definition of its unit."""
+        return Port(
+            "",
+            self.name,
+            self.shape,
+            self.unit,
+            kind="String" if self.type == "String" else "Binary" if self.type == "Binary" else "number",
+            definition=definitions.get(self.unit or ""),
+            relative=self.relative,
+            count=self.size,
+        )
+
     def start_values(self, start: Mapping[str, list[Any]]) -> list[float]:
         """Return the start values: those given by variable, else the model description's, else 0."""
         found: list[float] = []
@@ -74,6 +89,18 @@ def unit_of(variable: Any) -> str | None:
     return str(unit) if unit else None
 
 
+def unit_definitions(description: Any) -> dict[str, Definition]:
+    """Return the units that a model description defines by base units."""
+    units = [unit for unit in description.unitDefinitions or () if unit.baseUnit is not None]
+    return {str(unit.name): definition_of(unit.baseUnit) for unit in units}
+
+
+def definition_of(base: Any) -> Definition:
+    """Return the definition that FMPy read from a BaseUnit element."""
+    exponents = tuple(int(getattr(base, name)) for name in BASE_UNITS)
+    return Definition(exponents, float(base.factor), float(base.offset))
+
+
 def display_unit_of(variable: Any) -> str | None:
     """Return the unit in which a variable is to be shown, its own or its declared type's."""
     declared = variable.declaredType
@@ -92,7 +119,7 @@ def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[st
             index = tuple(int(i) for i in match[2].split(","))
             groups.setdefault((match[1], len(index)), []).append((index, v))
         else:
-            found[v.name] = _single(v, shape)
+            found[v.name] = single(v, shape)
     ranks = Counter(base for base, _ in groups)
     for (base, rank), members in groups.items():
         members.sort(key=lambda member: member[0])
@@ -101,14 +128,15 @@ def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[st
         whole = len({i for i, _ in members}) == len(members) == math.prod(shape)
         alone = base not in found and ranks[base] == 1
         if not alone or not whole or members[0][0] != (1,) * rank or len(kinds) != 1:
-            found |= {v.name: _single(v, ()) for _, v in members}
+            found |= {v.name: single(v, ()) for _, v in members}
             continue
         type_, unit = kinds.pop()
         found[base] = FMUPort(base, shape, unit, type_, tuple(v for _, v in members))
     return found
 
 
-def _single(v: Any, shape: Shape) -> FMUPort:
+def single(v: Any, shape: Shape) -> FMUPort:
+    """Return the port of one variable."""
     if math.prod(shape) > MAX_ELEMENTS:
         raise FMUError(
             f"variable {v.name[:80]} of shape {shape} has more than {MAX_ELEMENTS:,} values; "

@@ -16,16 +16,13 @@ from typing import Any
 import numpy as np
 
 from ..codegen.kernels import kernel_addresses
+from ..core.dependencies import dependencies
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from ..core.variables import Array
-from ..errors import CompilationError, DeclarationError
+from ..errors import CompilationError, CompiledKernelsWarning, DeclarationError
 from ..loop.operations import CALL, COPY, Op
 from ..loop.signals import KERNEL, Failures
 from ..result import SimulationError
-
-
-class CompiledKernelsWarning(UserWarning):
-    """A block runs as a Python callback because Numba cannot compile it."""
 
 
 class KernelInstance:
@@ -190,7 +187,7 @@ class KernelInstance:
         """Return, for every output, the inputs on which it depends directly."""
         inputs = {n for n, v in self.participant.variables.items() if v.kind == "input"}
         kinds = {n: v.kind for n, v in self.participant.variables.items()}
-        found = {n: d & inputs for n, d in self.participant.dependencies().items() if kinds[n] == "output"}
+        found = {n: d & inputs for n, d in dependencies(self.participant).items() if kinds[n] == "output"}
         return found | {n: set() for n, kind in kinds.items() if kind == "state"}
 
     def locate(self, slot_address: int) -> str:

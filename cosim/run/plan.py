@@ -7,11 +7,10 @@ from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Literal, get_args
 
+from ..core.port import Port
 from ..core.tableaus import TABLEAUS
 from ..errors import TimeError, WiringError, did_you_mean
-from ..fmi.fmu import FMU
-from ..system.system import Port, System, inputs_of, outputs_of
-from ..system.text_ports import TextPort, text_port
+from ..system.system import System
 
 Coupling = Literal["sampled", "iterated", "continuous"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4"]
@@ -65,27 +64,29 @@ def port_names(names: Iterable[str]) -> list[str]:
     return found
 
 
-def text_ports(system: System, names: list[str] | None) -> tuple[list[TextPort], list[str] | None]:
-    """Return the ports to record that are strings or binary data, and the names of the others."""
-    found = {name: text_port(system, name, "output") for name in names or ()}
-    texts = [port for port in found.values() if port is not None]
-    return texts, None if names is None else [name for name in names if found[name] is None]
-
-
 def ports(system: System, names: list[str] | None) -> list[Port]:
-    """Return the ports of numbers with these names; None means every output and state."""
+    """Return the ports with these names; None means every declared output and state."""
     if names is None:
         return [
             system.port(f"{name}.{port}", "output")
-            for name, member in system.participants.items()
-            for port in (member.declared_outputs if isinstance(member, FMU) else outputs_of(member))
+            for name, component in system.participants.items()
+            for port in component.declared_outputs
         ]
     return [_readable(system, name) for name in names]
 
 
+def numbers(ports: Iterable[Port]) -> list[Port]:
+    """Return the ports; refuse strings and binary data."""
+    found = list(ports)
+    for port in found:
+        if port.kind != "number":
+            raise WiringError(f"{port} is a {port.kind}; statistics are of numbers, so leave it out")
+    return found
+
+
 def _readable(system: System, name: str) -> Port:
-    """Find a port to record: an output, a state, or an input (the value that was used)."""
+    """Find a port to record: an output, a state, or an input of numbers (the value that was used)."""
     where, _, port = name.partition(".")
-    if where in system.participants and port.partition("[")[0] in inputs_of(system.participants[where]):
-        return system.port(name, "input")
-    return system.port(name, "output")
+    component = system.participants.get(where)
+    found = component.ports("input").get(port.partition("[")[0]) if component is not None else None
+    return system.port(name, "input" if found is not None and found.kind == "number" else "output")

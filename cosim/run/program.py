@@ -21,7 +21,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ..core.participant import Block, Continuous
+from ..core.participant import Continuous
+from ..core.port import Port
 from ..core.tableaus import TABLEAUS
 from ..core.time_grid import steps_between
 from ..core.variables import Array
@@ -35,8 +36,7 @@ from ..loop.operations import CALL, COMBINE, COPY, GATHER, RECORD, STATISTICS, O
 from ..loop.signals import EndOfRun, Failures, operation_error
 from ..result import SimulationError
 from ..system.evaluation_order import evaluation_order
-from ..system.system import Connection, Port, System, is_block
-from ..system.text_ports import TextPort
+from ..system.system import Connection, System
 from .coupling.iterated import IteratedCoupling
 from .kernel_instance import KernelInstance, buffer
 
@@ -64,7 +64,7 @@ class Program:
         decimation: int,
         jit: bool,
         tolerance: float = 1e-8,
-        texts: Iterable[TextPort] = (),
+        texts: Iterable[Port] = (),
     ) -> None:
         self.system = system
         self.h = h
@@ -81,7 +81,7 @@ class Program:
         self.coupling = f"stage coupling, {solver}" if coupling == "continuous" else f"{coupling} coupling"
         stage = coupling == "continuous"
         #: strings and binary data to record, and what was, a list a port
-        self.recorded_texts: dict[TextPort, list[str | bytes]] = {port: [] for port in texts}
+        self.recorded_texts: dict[Port, list[str | bytes]] = {port: [] for port in texts}
         ends = [end for c in system.connections for end in (c.source, c.target)]
         heard = [c.source for c in system.text_connections]
         used = {(p.participant, p.name) for p in [*record, *statistics, *ends]}
@@ -175,7 +175,6 @@ class Program:
     def _rate(self, name: str) -> int | None:
         """Return every how many steps a block acts; None when it follows the coupling."""
         block = self.system.participants[name]
-        assert isinstance(block, (Block, FMU))
         if block.sample_period is not None:
             return steps_between(block.sample_period, self.h, f"{name}: sample period")
         return block.every
@@ -188,7 +187,7 @@ class Program:
         return crashes
 
     def _is_block(self, name: str) -> bool:
-        return is_block(self.system.participants[name])
+        return self.system.participants[name].as_block
 
     # --------------------------------------------------------------------- connections
 

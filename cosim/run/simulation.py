@@ -40,9 +40,9 @@ from .plan import (
     check_stop,
     check_system,
     check_time,
+    numbers,
     port_names,
     ports,
-    text_ports,
 )
 from .program import Program
 
@@ -106,9 +106,10 @@ class Simulation:
             "jit": jit,
             "tolerance": tolerance,
         }
-        texts, wanted = text_ports(system, self._options["record"])
-        recorded = ports(system, wanted)
-        watched = recorded if statistics is None else ports(system, self._options["statistics"])
+        asked = ports(system, self._options["record"])
+        texts = [port for port in asked if port.kind != "number"]
+        recorded = [port for port in asked if port.kind == "number"]
+        watched = recorded if statistics is None else numbers(ports(system, self._options["statistics"]))
         self._program = Program(
             system, self.step, coupling, solver, recorded, watched, self.decimation, jit, tolerance, texts
         )

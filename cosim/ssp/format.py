@@ -20,8 +20,9 @@ from typing import Any, TypeAlias
 
 from lxml import etree
 
-from ..errors import CosimError, WiringError
-from ..units import conversion
+from ..errors import CosimError
+from ..fmi.ports import unit_definitions
+from ..units import BASE_UNITS, Definition
 
 SSD, SSC, SSV, SSM, SSB, OWN = "ssd", "ssc", "ssv", "ssm", "ssb", "structcosim"
 _SSP = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -48,9 +49,8 @@ TYPES_1 = {
     "Enumeration": "Enumeration",
     "Binary": "Binary",
 }
-BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-#: (exponents of the base units, factor, offset)
-Definition: TypeAlias = tuple[tuple[int, ...], float, float]
+#: the name of a unit, and its definition where there is one
+Unit: TypeAlias = tuple[str | None, Definition | None]
 
 
 class SSPError(CosimError):
@@ -130,39 +130,24 @@ class Units:
                 factor, offset = factor_and_offset(base, place)
                 if not all(map(math.isfinite, (*exponents, 1.0 / factor if factor else math.inf, offset))):
                     raise SSPError(f"{place}: its exponents, factor {factor} and offset {offset} are no unit")
-                found.definitions[unit.get("name", "")] = (tuple(map(int, exponents)), factor, offset)
+                defined = Definition(tuple(map(int, exponents)), factor, offset)
+                found.definitions[unit.get("name", "")] = defined
         return found
 
     def add_fmu(self, description: Any) -> None:
         """Add the units that an FMU defines; a definition that is there already stays."""
-        for unit in description.unitDefinitions or []:
-            base = unit.baseUnit
-            if base is not None:
-                exponents = tuple(int(getattr(base, n)) for n in BASE_UNITS)
-                self.definitions.setdefault(unit.name, (exponents, float(base.factor), float(base.offset)))
+        self.definitions = unit_definitions(description) | self.definitions
 
     def attributes(self, name: str) -> dict[str, str]:
         """Return the attributes of a unit's BaseUnit, in SSP as in FMI."""
-        exponents, factor, offset = self.definitions[name]
-        found = {n: str(e) for n, e in zip(BASE_UNITS, exponents, strict=True) if e}
-        found |= {"factor": repr(factor)} if factor != 1.0 else {}
-        return found | ({"offset": repr(offset)} if offset != 0.0 else {})
+        unit = self.definitions[name]
+        found = {n: str(e) for n, e in zip(BASE_UNITS, unit.exponents, strict=True) if e}
+        found |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
+        return found | ({"offset": repr(unit.offset)} if unit.offset != 0.0 else {})
 
-    def convert(self, source: str | None, target: str | None) -> tuple[float, float]:
-        """Return (factor, offset) with `value in target = factor * value in source + offset`."""
-        if source is None or target is None or source == target:
-            return 1.0, 0.0
-        if source not in self.definitions or target not in self.definitions:
-            return conversion(source, target)
-        a, b = self.definitions[source], self.definitions[target]
-        if a[0] != b[0]:
-            raise WiringError(f"'{source}' ({_si(a)}) is not convertible to '{target}' ({_si(b)})")
-        return a[1] / b[1], (a[2] - b[2]) / b[1]
-
-
-def _si(definition: Definition) -> str:
-    parts = [f"{n}^{e}" if e != 1 else n for n, e in zip(BASE_UNITS, definition[0], strict=True) if e]
-    return " ".join(parts) or "1"
+    def of_name(self, name: str | None) -> Unit:
+        """Return a unit with the definition that the file gives."""
+        return name, self.definitions.get(name or "")
 
 
 def element_name(path: tuple[str, ...]) -> str:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
+from ..units import conversion
 from .format import (
     NAMESPACES,
     SSC,
@@ -22,6 +23,7 @@ from .format import (
     SSM,
     SSV,
     SSPError,
+    Unit,
     Units,
     factor_and_offset,
     flag,
@@ -47,12 +49,13 @@ class Value:
     offset: float = 0.0
     keep_unit: bool = False
 
-    def in_unit(self, unit: str | None, units: Units) -> Any:
+    def in_unit(self, unit: Unit, units: Units) -> Any:
         """Return the value in a variable's unit, with the transformations on the way."""
         if self.kind not in _REALS:
             return self.value
-        known = Units(units.definitions | self.units.definitions)
-        scale, shift = (1.0, 0.0) if self.keep_unit else known.convert(self.unit, unit)
+        known = units.definitions | self.units.definitions
+        own = known.get(self.unit or "")
+        scale, shift = (1.0, 0.0) if self.keep_unit else conversion(self.unit, unit[0], own, unit[1])
         if (scale, shift, self.factor, self.offset) == (1.0, 0.0, 1.0, 0.0):
             return self.value
         return (self.factor * (scale * np.asarray(self.value) + shift) + self.offset).tolist()

@@ -23,14 +23,15 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
+from ..core.component import Component
 from ..core.participant import Block, Participant
 from ..errors import CosimError, WiringError, did_you_mean
 from ..fmi.file.archive import Archive, Extraction
 from ..fmi.file.model_description import read_description
 from ..fmi.fmu import FMU
-from ..fmi.ports import unit_of
-from ..system.system import Member, System, inputs_of, outputs_of
-from ..system.text_ports import text_port
+from ..fmi.ports import unit_definitions, unit_of
+from ..system.system import System
+from ..units import conversion
 from .format import (
     FMU_TYPE,
     NAMESPACES,
@@ -38,6 +39,7 @@ from .format import (
     SSD,
     VERSIONS,
     SSPError,
+    Unit,
     Units,
     element_name,
     flag,
@@ -47,7 +49,7 @@ from .format import (
     tag,
 )
 from .parameters import Parameters, Value
-from .structure import Element, Link, Structure
+from .structure import Element, Link, Node, Structure
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Package:
 
 
 def read_ssp(
-    path: str | PathLike[str], *, replace: Mapping[str, Member | type[Participant]] | None = None
+    path: str | PathLike[str], *, replace: Mapping[str, Component | type[Participant]] | None = None
 ) -> System:
     """Return the system of an SSP; `replace` puts participants in the place of components, by name.
 
@@ -82,7 +84,7 @@ def read_ssp(
 
 
 def read_package(
-    path: str | PathLike[str], *, replace: Mapping[str, Member | type[Participant]] | None = None
+    path: str | PathLike[str], *, replace: Mapping[str, Component | type[Participant]] | None = None
 ) -> Package:
     """Return the system and the default experiment of an SSP."""
     with Archive(Path(path), "SSP") as archive:
@@ -92,12 +94,12 @@ def read_package(
 class _Reader:
     """Reads one package."""
 
-    def __init__(self, archive: Archive, replace: dict[str, Member | type[Participant]]) -> None:
+    def __init__(self, archive: Archive, replace: dict[str, Component | type[Participant]]) -> None:
         self.where = archive.path.name
         self.archive = archive
         self.replace = replace
         #: what took the place of components
-        self.replaced: dict[str, Member] = {}
+        self.replaced: dict[str, Component] = {}
         self.extraction: Extraction | None = None
         self.root = parse_xml(self.read(ROOT, self.where), f"{self.where}/{ROOT}")
         version = self.root.get("version", "none")
@@ -158,7 +160,7 @@ class _Reader:
 
     # ---------------------------------------------------------------------- components
 
-    def _other(self, name: str, element: Element) -> Member:
+    def _other(self, name: str, element: Element) -> Component:
         """Return the participant that takes the place of a component."""
         given = self.replace[name]
         if isinstance(given, type):
@@ -213,17 +215,27 @@ class _Reader:
         self.units.add_fmu(description)
         variables = {v.name: v for v in description.modelVariables}
         found = self.parameters.of(element)
-        start = {n: self._start(value, variables[n]) for n, value in found.items() if n in variables}
+        defined = unit_definitions(description)
+
+        def unit(variable: Any) -> Unit:
+            name = unit_of(variable)
+            return name, defined.get(name or "")
+
+        start = {
+            n: self._start(value, variables[n], unit(variables[n]))
+            for n, value in found.items()
+            if n in variables
+        }
         for link in links:
             if link.target.path == element.path and link.target.name in variables:
                 value = self.parameters.values.get(link.origin)
                 if value is not None and link.origin.path not in self.structure.components:
-                    start[link.target.text] = self._along(link, value, variables[link.target.name])
+                    start[link.target.text] = self._along(link, value, unit(variables[link.target.name]))
         return start
 
-    def _start(self, value: Value, variable: Any) -> Any:
+    def _start(self, value: Value, variable: Any, unit: Unit) -> Any:
         if value.kind != "Enumeration":
-            return value.in_unit(unit_of(variable), self.units)
+            return value.in_unit(unit, self.units)
         items = {i.name: int(i.value) for i in getattr(variable.declaredType, "items", None) or []}
         names = value.value if isinstance(value.value, list) else [value.value]
         for name in names:
@@ -231,10 +243,10 @@ class _Reader:
                 raise SSPError(f"'{name}' is no item of {variable.name}" + did_you_mean(name, items))
         return [items[n] for n in names] if isinstance(value.value, list) else items[value.value]
 
-    def _along(self, link: Link, value: Value, variable: Any) -> Any:
+    def _along(self, link: Link, value: Value, unit: Unit) -> Any:
         """Return the value of a system's connector as what arrives at a component's."""
-        first = self.structure.units.get(link.origin) or value.unit
-        scale, offset = self._transformation(link, first, unit_of(variable))
+        first = self.units.of_name(self.structure.units.get(link.origin) or value.unit)
+        scale, offset = self._transformation(link, first, unit)
         plain = value.in_unit(first, self.units)
         return plain if (scale, offset) == (1.0, 0.0) else scale * plain + offset
 
@@ -252,23 +264,24 @@ class _Reader:
             )
         try:
             transformation = None
-            if text_port(system, a, "output") is None:
-                source, sink = system.port(a, "output"), system.port(b, "input")
-                relative = system.is_relative(source) or system.is_relative(sink)
-                transformation = self._transformation(link, source.unit, sink.unit, relative)
+            source, sink = system.port(a, "output"), system.port(b, "input")
+            if source.kind == sink.kind == "number":
+                relative = source.relative or sink.relative
+                ends = (source.unit, source.definition), (sink.unit, sink.definition)
+                transformation = self._transformation(link, *ends, relative)
             elif any((edge.factor, edge.offset) != (1.0, 0.0) for edge in link.edges):
                 transformation = (0.0, 0.0)  # which is refused for a text
             system.connect(a, b, initial=late, transformation=transformation)
         except WiringError as error:
-            ends = (element_name(node.path) for node in (origin, target))
-            for name in (n for n in ends if n in self.replaced):
+            names = (element_name(node.path) for node in (origin, target))
+            for name in (n for n in names if n in self.replaced):
                 member = self.replaced[name]
-                ports = ", ".join([*inputs_of(member), *outputs_of(member)])
+                ports = ", ".join([*member.ports("input"), *member.ports("output")])
                 text += f" ({name} is replaced by a {type(member).__name__}, ports: {ports})"
             raise WiringError(f"{self.where}: {text}: {error}") from error
 
     def _transformation(
-        self, link: Link, first: str | None, last: str | None, relative: bool = False
+        self, link: Link, first: Unit, last: Unit, relative: bool = False
     ) -> tuple[float, float]:
         """Return (factor, offset) from a port's unit over all connectors to another port's unit.
 
@@ -281,17 +294,17 @@ class _Reader:
             if (factor, shift) != (1.0, 0.0):
                 scale, offset = factor * scale, factor * offset + shift
 
-        def to(other: str | None) -> None:
+        def to(other: Unit) -> None:
             nonlocal unit
-            factor, shift = self.units.convert(unit, other)
+            factor, shift = conversion(unit[0], other[0], unit[1], other[1])
             apply(factor, 0.0 if relative else shift)
-            unit = other or unit
+            unit = other if other[0] else unit
 
-        to(self.structure.units.get(link.origin.whole))
+        to(self._unit_at(link.origin))
         for edge in link.edges:
-            other = self.structure.units.get(edge.target.whole)
-            if edge is link.edges[-1]:
-                other = other or last  # a linear transformation comes after the conversion
+            other = self._unit_at(edge.target)
+            if edge is link.edges[-1] and not other[0]:
+                other = last  # a linear transformation comes after the conversion
             if edge.keep_unit:
                 unit = other
             else:
@@ -299,6 +312,9 @@ class _Reader:
             apply(edge.factor, edge.offset)
         to(last)
         return scale, offset
+
+    def _unit_at(self, node: Node) -> Unit:
+        return self.units.of_name(self.structure.units.get(node.whole))
 
     def _experiment(self) -> Experiment:
         found = self.root.find(f"{SSD}:DefaultExperiment", NAMESPACES)

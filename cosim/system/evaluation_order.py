@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
+from ..core.port import Port
 from ..errors import WiringError
-from .system import Connection, Port, cycle_text
+from .system import Connection, cycle_text
 
 
 def evaluation_order(

@@ -1,4 +1,4 @@
-"""A system: participants by name, and connections between their ports.
+"""A system: components by name, and connections between their ports.
 
     system = System(
         {"plant": FMU("plant.fmu"), "control": SwitchingControl(M=100.0)},
@@ -8,6 +8,9 @@
 A port is named `participant.port`; elements of an array count from 1, as in Modelica
 and in FMU variable names: `building.accel[3]`, `building.accel[2:4]`. Everything that
 can be checked without time is checked here.
+
+Strings and binary data are handed on as numbers are: read at t_k, set before the step from
+t_k. A String goes to a String, a Binary to a Binary, one value each.
 """
 
 from __future__ import annotations
@@ -15,38 +18,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from types import NoneType
-from typing import TypeAlias
 
 import numpy as np
 
-from ..core.participant import Block, Participant
+from ..core.component import Component
+from ..core.port import Direction, Port
 from ..core.variables import Array
 from ..errors import WiringError, did_you_mean
-from ..fmi.fmu import FMU
-from ..units import conversion
-from .text_ports import TextConnection, text_connection
-
-Member: TypeAlias = Participant | FMU
-
-
-@dataclass(frozen=True)
-class Port:
-    """One end of a connection: `count` floats of a participant's port, from `first` on."""
-
-    participant: str
-    name: str
-    shape: tuple[int, ...]
-    unit: str | None
-    first: int = 0
-    count: int = 1
-    index: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.participant}.{self.name}{self.index}"
 
 
 @dataclass(frozen=True)
@@ -69,64 +51,49 @@ class Connection:
         return f"{self.target} <- {self.source}{factor}{delayed}"
 
 
-def inputs_of(member: Member) -> dict[str, tuple[tuple[int, ...], str | None]]:
-    """Return the input ports of a participant: name -> (shape, unit)."""
-    if isinstance(member, Participant):
-        return {n: (v.shape, v.unit) for n, v in member.variables.items() if v.kind == "input"}  # type: ignore[misc]
-    return member.inputs
-
-
-def outputs_of(member: Member) -> dict[str, tuple[tuple[int, ...], str | None]]:
-    """Return the ports that can be read: outputs and states."""
-    if isinstance(member, Participant):
-        kinds = ("output", "state")
-        return {n: (v.shape, v.unit) for n, v in member.variables.items() if v.kind in kinds}  # type: ignore[misc]
-    return member.outputs
-
-
-def is_block(member: Member) -> bool:
-    """Tell whether a participant acts at communication points: a Block, or an FMU in its place."""
-    return member.as_block if isinstance(member, FMU) else isinstance(member, Block)
-
-
 class System:
-    """Participants by name and the connections between them."""
+    """Components by name and the connections between them."""
 
     def __init__(
         self,
-        participants: Mapping[str, Member] | None = None,
+        participants: Mapping[str, Component] | None = None,
         connections: Iterable[tuple[str, str]] = (),
     ) -> None:
-        self.participants: dict[str, Member] = {}
+        self.participants: dict[str, Component] = {}
         self.connections: list[Connection] = []
-        #: those of strings and binary data
-        self.text_connections: list[TextConnection] = []
-        #: the connections of every input port, and the pairs of participants that are connected without delay
+        #: the connections of strings and binary data
+        self.text_connections: list[Connection] = []
+        #: the connections of every input port
         self._feeding: dict[tuple[str, str], list[Connection]] = {}
+        #: the pairs of components that are connected without delay
         self._links: set[tuple[str, str]] = set()
         if not isinstance(participants, (Mapping, NoneType)):
-            raise WiringError(f"{participants!r} is no dictionary of participants, such as {{'plant': ...}}")
-        for name, member in (participants or {}).items():
-            self.add(name, member)
+            raise WiringError(
+                f"{participants!r} must be a dictionary of participants, such as {{'plant': ...}}"
+            )
+        for name, component in (participants or {}).items():
+            self.add(name, component)
         for connection in connections:
             if not isinstance(connection, (tuple, list)) or len(connection) != 2:
-                raise WiringError(f"{connection!r} is no connection; write ('plant.x', 'control.x')")
+                raise WiringError(f"{connection!r} must be a connection, such as ('plant.x', 'control.x')")
             self.connect(*connection)
 
-    def add(self, name: str, member: Member) -> None:
-        """Add a participant under a name (letters, digits, underscores)."""
+    def add(self, name: str, component: Component) -> None:
+        """Add a component under a name of letters, digits and underscores."""
         if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_]\w*", name):
             raise WiringError(f"participant name '{name}' must be letters, digits and underscores")
-        if not isinstance(member, (Participant, FMU)):
-            made = (
-                f"{member.__name__}(...)" if isinstance(member, type) else "a Block, a Continuous or an FMU"
+        if isinstance(component, type) or not isinstance(component, Component):
+            wanted = (
+                f"{component.__name__}(...)"
+                if isinstance(component, type)
+                else "a Block, a Continuous or an FMU"
             )
-            raise WiringError(f"'{name}' is {member!r}, which is no participant; give {made}")
+            raise WiringError(f"'{name}' is {component!r}, which cannot take part in a system; give {wanted}")
         if name in self.participants:
-            raise WiringError(f"there is a participant '{name}' already; choose another name")
-        if any(member is other for other in self.participants.values()):
+            raise WiringError(f"the system has a participant '{name}' already; choose another name")
+        if any(component is other for other in self.participants.values()):
             raise WiringError(f"'{name}' is the same object as another participant; make a second one")
-        self.participants[name] = member
+        self.participants[name] = component
 
     def connect(
         self,
@@ -142,18 +109,18 @@ class System:
         scalar output may feed every element of an array input. `initial` delays the
         connection by one communication step and is the source's value, in its unit,
         before the first point: the way to break a cycle of blocks. `transformation`
-        (factor, offset), target = factor * source + offset, takes the place of the units'
-        conversion. A String of an FMU goes to a String input, a Binary to a Binary one.
+        (factor, offset), target = factor * source + offset, replaces the conversion of the
+        units. A String of an FMU goes to a String input, a Binary to a Binary input.
         """
         for name in (source, target):
             if not isinstance(name, str):
-                raise WiringError(f"{name!r} is no port; write participant.port, as text")
-        texts = text_connection(self, source, target, initial is None and transformation is None)
-        if texts is not None:
-            self._add_texts(texts)
-            return
-        out = self.port(source, "output")
-        into = self.port(target, "input")
+                raise WiringError(f"{name!r} must be a port, written as text: 'participant.port'")
+        out, into = self.port(source, "output"), self.port(target, "input")
+        if out.kind != into.kind:
+            kinds = " and ".join(
+                f"{port} is a {'number' if port.kind == 'number' else port.kind}" for port in (out, into)
+            )
+            raise WiringError(f"{kinds}: a String goes to a String, and a Binary to a Binary")
         if out.count != into.count and out.count != 1:
             raise WiringError(
                 f"{out} has shape {out.shape if not out.index else (out.count,)}, "
@@ -166,97 +133,91 @@ class System:
                 other.target.first + other.target.count
             ):
                 raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
-        try:
-            scale, offset = _factors(transformation) or conversion(out.unit, into.unit)
-            if transformation is None and (self.is_relative(out) or self.is_relative(into)):
-                offset = 0.0
-        except WiringError as error:
-            raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
-        if not (math.isfinite(scale) and math.isfinite(offset)):
-            raise WiringError(f"{out} -> {into}: transformation {transformation} is not finite")
-        connection = Connection(out, into, scale, offset, _initial(out, initial))
-        self.connections.append(connection)
+        if out.kind == "number":
+            scale, offset = _factors(out, into, transformation)
+            self._append(self.connections, Connection(out, into, scale, offset, _initial(out, initial)))
+        elif initial is None and transformation is None:
+            self._append(self.text_connections, Connection(out, into))
+        else:
+            raise WiringError(
+                f"{out} -> {into}: a {out.kind} cannot be delayed or transformed; leave initial and "
+                "transformation out"
+            )
+
+    def _append(self, connections: list[Connection], connection: Connection) -> None:
+        """Add a connection to its list, unless it closes a cycle of blocks."""
+        out, into = connection.source, connection.target
+        feeding = self._feeding[into.participant, into.name]
+        connections.append(connection)
         feeding.append(connection)
         link = (out.participant, into.participant)
-        if link in self._links or initial is not None:
-            return  # the order of blocks is what it was
+        if link in self._links or connection.initial is not None:
+            return  # the order of the blocks does not change
         try:
             self.block_order()
         except WiringError:
-            self.connections.pop()
+            connections.pop()
             feeding.pop()
             raise
         self._links.add(link)
 
-    def _add_texts(self, connection: TextConnection) -> None:
-        self.text_connections.append(connection)
-        try:
-            self.block_order()
-        except WiringError:
-            self.text_connections.pop()
-            raise
-
-    def is_relative(self, port: Port) -> bool:
-        """Tell whether a port is a difference, such as one of temperatures, whose unit has no offset."""
-        member = self.participants[port.participant]
-        if not isinstance(member, FMU):
-            return False
-        return (member.input_ports.get(port.name) or member.output_ports[port.name]).relative
-
-    def port(self, text: str, direction: str) -> Port:
+    def port(self, text: str, direction: Direction) -> Port:
         """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
         where, dot, name = text.partition(".")
-        if not dot or where not in self.participants:
+        if not dot:
+            raise WiringError(f"'{text}' is not a port; write participant.port")
+        if where not in self.participants:
             raise WiringError(
-                f"'{text}': there is no participant '{where}'" + did_you_mean(where, self.participants)
-                if dot
-                else f"'{text}' is no port; write participant.port"
+                f"'{text}': the system has no participant '{where}'" + did_you_mean(where, self.participants)
             )
-        member = self.participants[where]
-        ports = inputs_of(member) if direction == "input" else outputs_of(member)
-        if direction == "input" and isinstance(member, FMU):
-            name = member.aliases.get(name, name)
-        if name in ports:
-            shape, unit = ports[name]
-            count = 1
-            for n in shape:
-                count *= n
-            return Port(where, name, shape, unit, 0, count)
+        component = self.participants[where]
+        ports = component.ports(direction)
         base, bracket, index = name.partition("[")
-        if bracket and base in ports:
-            return _element(Port(where, base, *ports[base]), bracket + index)
-        others = outputs_of(member) if direction == "input" else inputs_of(member)
-        if base in others:
+        if name in ports:
+            base, index = name, ""
+        found = ports.get(base)
+        if found is None:
+            others = component.ports("input" if direction == "output" else "output")
+            if name in others or base in others:
+                is_one, wanted = ("output", "input") if direction == "input" else ("input", "output")
+                raise WiringError(f"{text} is an {is_one}, not an {wanted}")
+            raise WiringError(f"{where} has no {direction} '{base}'" + did_you_mean(base, ports))
+        if found.kind != "number" and found.shape:
             raise WiringError(
-                f"{text} is an {'output' if direction == 'input' else 'input'}, not an {direction}"
+                f"{text} is an array of type {found.kind}; only single values of that type can be connected"
             )
-        if isinstance(member, FMU) and name in member.text_inputs | member.text_outputs:
-            raise WiringError(f"{text} is text, not a number")
-        raise WiringError(f"{where} has no {direction} '{base}'" + did_you_mean(base, ports))
+        port = replace(found, participant=where)
+        return _element(port, bracket + index) if index else port
 
     def block_order(self) -> list[str]:
         """Return the blocks in the order of their connections; a cycle of blocks is an error."""
-        blocks = [n for n, m in self.participants.items() if is_block(m)]
-        graph: dict[str, list[str]] = {name: [] for name in blocks}
-        direct = (c for c in self.connections if c.initial is None)
-        links = [(c.source.participant, c.target.participant) for c in direct]
-        links += [(c.source.participant, c.target.participant) for c in self.text_connections]
-        for a, b in links:
-            if a in graph and b in graph:
-                graph[b].append(a)
+        graph: dict[str, list[str]] = {n: [] for n, c in self.participants.items() if c.as_block}
+        direct = [c for c in self.connections if c.initial is None]
+        for c in [*direct, *self.text_connections]:
+            if c.source.participant in graph and c.target.participant in graph:
+                graph[c.target.participant].append(c.source.participant)
         try:
             return list(TopologicalSorter(graph).static_order())
         except CycleError as error:
-            raise WiringError(cycle_text(error.args[1], self.connections)) from None
+            links = [*self.connections, *self.text_connections]
+            raise WiringError(cycle_text(error.args[1], links)) from None
 
 
-def _factors(transformation: object) -> tuple[float, float] | None:
+def _factors(out: Port, into: Port, transformation: object) -> tuple[float, float]:
+    """Return (factor, offset) of a connection of numbers, from its units unless it is given."""
     if transformation is None:
-        return None
+        try:
+            return out.conversion_to(into)
+        except WiringError as error:
+            raise WiringError(f"{out} [{out.unit}] -> {into} [{into.unit}]: {error}") from error
     try:
         scale, offset = map(float, transformation)  # type: ignore[call-overload]
     except (TypeError, ValueError):
-        raise WiringError(f"transformation={transformation!r} is no (factor, offset)") from None
+        raise WiringError(
+            f"transformation={transformation!r} must be two numbers, (factor, offset)"
+        ) from None
+    if not (math.isfinite(scale) and math.isfinite(offset)):
+        raise WiringError(f"{out} -> {into}: transformation {transformation} must be finite")
     return scale, offset
 
 
@@ -274,7 +235,7 @@ def _initial(source: Port, value: Array | float | None) -> Array | None:
 
 
 def cycle_text(path: list[str], connections: list[Connection]) -> str:
-    """Return the message for an algebraic cycle through the named participants."""
+    """Return the message for an algebraic cycle through the named components."""
     links = []
     for a, b in pairwise(path):
         found = [c for c in connections if (c.source.participant, c.target.participant) == (a, b)]
@@ -292,12 +253,10 @@ def _element(port: Port, index: str) -> Port:
     rank = 2 if match and match[2] == "," else 1
     if not match or len(shape) != rank:
         raise WiringError(
-            f"'{port}{index}': cannot index shape {shape} so; write [3] or [2:4], for a matrix [2,1]"
+            f"'{port}{index}' cannot index shape {shape}; write [3] or [2:4], for a matrix [2,1]"
         )
     a, b = int(match[1]), int(match[3] or match[1])
-    low = (a, b) if rank == 2 else (a, a)
     if min(a, b) < 1 or a > shape[0] or b > shape[-1] or (rank == 1 and b < a):
         raise WiringError(f"'{port}{index}' is outside shape {shape}; elements count from 1")
-    if rank == 2:
-        return Port(port.participant, port.name, shape, port.unit, (a - 1) * shape[1] + b - 1, 1, index)
-    return Port(port.participant, port.name, shape, port.unit, low[0] - 1, b - a + 1, index)
+    first, count = ((a - 1) * shape[1] + b - 1, 1) if rank == 2 else (a - 1, b - a + 1)
+    return replace(port, first=first, count=count, index=index)

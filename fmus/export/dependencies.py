@@ -1,7 +1,8 @@
 """Which element of which unknown depends on which known: ModelStructure of an FMU.
 
-`Participant.dependencies()` reads the kernels and answers by variable: a superset. By
-element it is refined here by running the model, where that is exact: the IR of the
+`cosim.core.dependencies` reads the kernels and answers by variable: a superset, which is
+enough to order a run. An exported FMU tells its host which element depends on which, so
+that answer is refined here by running the model, where that is exact: the IR of the
 kernels compares no floating-point numbers, so the same instructions run whatever the
 values, and outputs are analytic functions of them (sums, products, quotients, functions
 of libm). An analytic function that does not depend on an element never changes with it;
@@ -23,6 +24,7 @@ import numpy as np
 
 from cosim import Array, Continuous, Participant
 from cosim.codegen.kernels import load
+from cosim.core.dependencies import dependencies
 from cosim.core.variables import KINDS, Variable
 
 from .link import is_listed, reachable
@@ -66,7 +68,7 @@ def structure(participant: Participant, kernels: str) -> Structure:
     with_derivatives = slots["state"] if slots["derivative"] else []  # none: it moves by advance alone
     derivative_of = dict(zip(with_derivatives, slots["derivative"], strict=True))
     running: dict[int, tuple[int, ...]] = {}
-    for name, known in participant.dependencies().items():
+    for name, known in dependencies(participant).items():
         needed = tuple(s for v in variables.values() if v.name in known for s in _slots(v))
         running |= dict.fromkeys(_slots(variables[name]), needed)
     parameters = [s for v in _settable(participant) for s in _slots(v)]

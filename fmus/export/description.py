@@ -14,28 +14,16 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from lxml import etree
 
 from cosim import Continuous, Participant, WiringError
 from cosim.core.variables import Variable
-from cosim.units import parse, registry
+from cosim.units import BASE_UNITS, definition, parse
 
 from .dependencies import Structure
 from .link import ExportError, Model, fmi_name, is_listed
-
-_BASE_UNITS = {
-    "gram": "kg",
-    "meter": "m",
-    "second": "s",
-    "ampere": "A",
-    "kelvin": "K",
-    "mole": "mol",
-    "candela": "cd",
-    "radian": "rad",
-}
 
 
 @dataclass(frozen=True)
@@ -102,32 +90,14 @@ def _elements(participant: Participant, arrays: bool) -> Iterator[Element]:
 # -------------------------------------------------------------------------- units
 
 
-@lru_cache(maxsize=1024)
 def unit_definition(unit: str) -> tuple[dict[str, int], float, float]:
     """Return exponents of the SI base units, factor and offset of a unit; pint knows them."""
     try:
-        parsed = parse(unit)
+        found = definition(unit)
     except WiringError as error:
         raise ExportError(str(error)) from error
-    quantity = registry().Quantity
-    zero = quantity(0.0, parsed).to_root_units()
-    one = quantity(1.0, parsed).to_root_units()
-    factor, offset = float(one.magnitude - zero.magnitude), float(zero.magnitude)
-    exponents = {}
-    for name, exponent in one._units.items():
-        if name not in _BASE_UNITS:
-            raise ExportError(f"unit '{unit}' is made of '{name}', for which FMI has no base unit")
-        if exponent != int(exponent):
-            raise ExportError(f"unit '{unit}' has the power {exponent} of {name}; FMI has whole powers only")
-        exponents[_BASE_UNITS[name]] = int(exponent)
-        if name == "gram":
-            factor, offset = factor * 1e-3 ** int(exponent), offset * 1e-3 ** int(exponent)
-    return exponents, _rounded(factor), _rounded(offset)
-
-
-def _rounded(x: float) -> float:
-    """Drop the rounding of a chain of conversions: 0.9999999999999999 is 1."""
-    return float(f"{x:.15g}")
+    exponents = {n: e for n, e in zip(BASE_UNITS, found.exponents, strict=True) if e}
+    return exponents, found.factor, found.offset
 
 
 def unit_name(v: Variable) -> str | None:

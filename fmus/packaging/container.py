@@ -30,9 +30,10 @@ from typing import Any
 from lxml import etree
 
 from cosim import FMU, Block, Input, Output, Parameter, State, System
+from cosim.core.port import Port
 from cosim.fmi.ports import FMUPort, unit_of
 from cosim.ssp.format import Units
-from cosim.system.system import Connection, Port, is_block
+from cosim.system.system import Connection
 
 from ..export.description import DefaultExperiment
 from ..export.fmu import write_archive
@@ -110,7 +111,7 @@ def _with_conversions(system: System) -> tuple[System, list[str]]:
         while name in wired.participants:
             name += "_"
         source = c.source.participant
-        of_block = is_block(system.participants[source])
+        of_block = system.participants[source].as_block
         values: dict[str, Any] = {"n": c.source.count, "factor": c.scale, "offset": c.offset}
         if c.initial is not None:
             wired.add(name, Late(of_block=float(of_block), kept=c.initial, **values))
@@ -131,7 +132,7 @@ def _check(system: System, step: float) -> None:
     for texts in system.text_connections:
         raise ExportError(f"{texts.source} -> {texts.target} is text, which a container does not connect")
     for name, member in system.participants.items():
-        if isinstance(member, (Block, FMU)) and is_block(member):
+        if member.as_block:
             period = member.sample_period or (member.every or 1) * step
             if abs(period - step) > 1e-9 * step:
                 raise ExportError(

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cosim import FMU, CosimError, System
+from cosim import FMU, CosimError, Participant, System
+from cosim.core.component import Component
 from cosim.fmi.file.model_description import read_description
 from cosim.fmi.instance.fmi2 import Fmi2
 from cosim.fmi.instance.fmi3 import Fmi3
 from cosim.fmi.ports import FMUPort, Shape, ports
-from cosim.system.system import Member
 
 from ..export.fmu import export
 
@@ -23,7 +23,7 @@ class Part:
     """A participant, its FMU file, and what the file declares."""
 
     name: str
-    member: Member
+    member: Component
     file: bytes
     description: Any
     #: the file's name; participants with the same file share one
@@ -45,6 +45,7 @@ def fmu_parts(system: System, fmi_version: str, platforms: list[str] | None) -> 
             if isinstance(member, FMU):
                 file = member.path
             else:
+                assert isinstance(member, Participant)
                 file = Path(folder) / f"{name}.fmu"
                 try:
                     export(member, file, fmi_version=fmi_version, platforms=platforms)

@@ -25,7 +25,9 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from cosim import FMU, Block, System
+from cosim import FMU, System
+from cosim.core.component import Component
+from cosim.core.port import Port
 from cosim.fmi.fmu import DEFAULT_TOLERANCE
 from cosim.fmi.ports import FMUPort, unit_of
 from cosim.ssp.format import (
@@ -43,8 +45,7 @@ from cosim.ssp.format import (
     Units,
     tag,
 )
-from cosim.system.system import Connection, Member, Port
-from cosim.system.text_ports import TextPort
+from cosim.system.system import Connection
 
 from ..export.fmu import write_archive
 from .parts import Part, fmu_parts
@@ -101,13 +102,8 @@ def export_ssp(
 
 
 def _connections(system: System) -> list[Connection]:
-    """Return the connections of numbers, and those of strings and binary data like them."""
-
-    def port(end: TextPort) -> Port:
-        return Port(end.participant, end.name, (), None)
-
-    texts = [Connection(port(c.source), port(c.target)) for c in system.text_connections]
-    return [*system.connections, *texts]
+    """Return the connections of numbers, and those of strings and binary data."""
+    return [*system.connections, *system.text_connections]
 
 
 def _needs_2(system: System, parts: dict[str, Part]) -> str:
@@ -331,10 +327,10 @@ def _annotate(notes: etree._Element, name: str, facts: dict[str, str]) -> None:
     _add(note, OWN, name, **facts)
 
 
-def _facts(member: Member) -> dict[str, str]:
+def _facts(member: Component) -> dict[str, str]:
     """Return what the standard does not say of a participant: our annotation."""
     facts: dict[str, str] = {}
-    if isinstance(member, Block) or (isinstance(member, FMU) and member.as_block):
+    if member.as_block:
         facts["kind"] = "block"
         if member.every is not None:
             facts["every"] = str(member.every)

@@ -37,9 +37,8 @@ from controllers.laws.equivalent_control import EquivalentControlGain
 from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from controllers.laws.state_dependent import StateDependentGain
 from controllers.laws.switching import HysteresisControl, SaturationControl
-from cosim import Block, Result, System, el_centro, simulate
+from cosim import Block, G, Result, System, el_centro, simulate
 from cosim.blocks import RecordSource, SensorDynamics, WeightedSum, WhiteNoise, function_source
-from cosim.ground_motion.ground_motion import G
 from fmus.export import as_fmu
 from fmus.plants.oscillator import Oscillator
 

@@ -28,10 +28,7 @@ from controllers.laws.viscous_dampers import ViscousDampers
 from controllers.observers.kinematic_observer import KinematicObserver
 from controllers.observers.observer import Observer
 from cosim import System
-from cosim.blocks.actuator import Saturation
-from cosim.blocks.adc import AnalogToDigital
-from cosim.blocks.noise import MeasurementNoise
-from cosim.blocks.sources import RecordSource
+from cosim.blocks import AnalogToDigital, MeasurementNoise, RecordSource, Saturation
 from fmus.plants.nonlinear_structure import NonlinearStructure
 from scenarios.highway_bridge.earthquakes import Earthquake
 

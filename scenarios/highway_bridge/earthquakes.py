@@ -20,8 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import Array, RecordError, el_centro, read_at2
-from cosim.errors import did_you_mean
+from cosim import Array, RecordError, did_you_mean, el_centro, read_at2
 
 #: the benchmark's gravity; the packages' records are in g too
 G_BENCHMARK = 9.81

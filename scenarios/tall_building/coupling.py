@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim import Result, System, simulate
-from cosim.run.plan import Coupling
+from cosim import Coupling, Result, System, simulate
 from fmus.export import as_fmu
 from fmus.loads.wind import FloorLoad
 from fmus.plants.damped_tower import DampedTower

@@ -17,7 +17,7 @@ from typing import Any
 
 from ...errors import FMUError, WiringError
 from ...units import conversion
-from ..ports import FMUPort
+from ..ports import FMUPort, definition_of
 
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
@@ -90,8 +90,9 @@ def _number(where: str, port: FMUPort, units: Iterable[Any], text: str) -> float
                 raise FMUError(
                     f"{what}: {given} is {inverse}{unit} times {display.factor:g}, and no value is shown so"
                 ) from None
+    defined = {u.name: definition_of(u.baseUnit) for u in units if u.baseUnit is not None}
     try:
-        scale, offset = conversion(given, unit)
+        scale, offset = conversion(given, unit, defined.get(given), defined.get(unit))
     except WiringError as error:
         known = f" (display units of the FMU: {', '.join(d.name for d in declared)})" if declared else ""
         raise FMUError(f"{what}: {error}{known}") from error

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.tableaus import TABLEAUS
-from ...errors import CosimError
+from ...errors import CosimError, LateEventWarning
 from ...loop.operations import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
 from ...loop.signals import Failures
 from ...run.kernel_instance import buffer
@@ -27,10 +27,6 @@ from ..fmu import FMU
 from .continuous_time import ContinuousTime
 from .event_steps import EventSteps, RungeKutta
 from .events import EventInstance
-
-
-class LateEventWarning(UserWarning):
-    """An event was handled at the end of the step that runs over it."""
 
 
 class ModelExchangeInstance(EventInstance):

@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ...core.port import Port
 from ...core.variables import Array
 from ...errors import WiringError
 from ...fmi.instance.co_simulation import CoSimulationInstance
@@ -27,7 +28,7 @@ from ...loop.loop import Loop
 from ...loop.operations import CALL, Op
 from ...loop.signals import EndOfRun, Failures
 from ...result import SimulationError
-from ...system.system import Connection, Port
+from ...system.system import Connection
 from ..kernel_instance import KernelInstance
 from .quasi_newton import NoConvergence, QuasiNewton
 

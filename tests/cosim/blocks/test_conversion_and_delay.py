@@ -86,5 +86,5 @@ def test_saturation(values, limit):
 
 
 def test_sizes_must_agree():
-    with pytest.raises(DeclarationError, match="sizes"):
+    with pytest.raises(DeclarationError, match=r"Saturation\.limit: shape \(2,\) does not fit .* n is 3"):
         Saturation([1.0, 2.0], n=3)

@@ -5,9 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from cosim import Block, DeclarationError, GroundMotion, Input, Output, System, simulate
+from cosim import (
+    Block,
+    CompiledKernelsWarning,
+    DeclarationError,
+    GroundMotion,
+    Input,
+    Output,
+    System,
+    simulate,
+)
 from cosim.blocks import Constant, RecordSource, WeightedSum, function_source
-from cosim.run.kernel_instance import CompiledKernelsWarning
 
 VALUES = np.random.default_rng(3).normal(size=90_001)
 

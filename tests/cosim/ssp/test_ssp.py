@@ -286,7 +286,7 @@ MAPPING = (
 REFUSED = [
     (system(TWO, connection("g.u", "h.u")), r"connection g\.u - h\.u: both connectors give a value"),
     (system(TWO, connection("g.x", "h.x")), r"connection g\.x - h\.x: both connectors take one"),
-    (system(TWO, connection("g.u", "k.x")), r"names the element 'k' \(there are: g, h\)"),
+    (system(TWO, connection("g.u", "k.x")), r"names the element 'k' \(available: g, h\)"),
     (system(TWO, connection("g.uu", "h.x")), r"it\.ssp: g has no connector 'uu'.*did you mean 'u'"),
     (
         system(TWO, connection("g.u", "h.x") + connection("h.u", "h.x")),

@@ -38,7 +38,7 @@ from controllers.observers.kinematic_observer import KinematicObserver
 from controllers.observers.observer import Observer
 from cosim import FMU, Array, Block, Participant, System, simulate
 from cosim.blocks import LowPass, WhiteNoise
-from cosim.system.system import Port
+from cosim.core.port import Port
 from fmus.export import export
 from fmus.plants.damped_tower import DampedTower
 from fmus.plants.oscillator import Oscillator

@@ -22,7 +22,6 @@ from fmu_manipulation_toolbox.cli.fmutool import fmutool
 
 from cosim import FMU, Block, Continuous, DeclarationError, Participant, System, simulate
 from cosim.blocks import Constant, WhiteNoise
-from cosim.system.system import inputs_of, outputs_of
 from fmus.export import export
 from fmus.export.fmu import FMI_VERSIONS
 from scenarios.highway_bridge.bridge import highway_bridge
@@ -85,16 +84,16 @@ def side_by_side(
     """Run a participant and its FMU on the same noise; return every port of each."""
     rate = {"every": ours.every, "sample_period": ours.sample_period} if isinstance(ours, Block) else {}
     system = System({"ours": ours, "fmu": FMU(path, as_block=isinstance(ours, Block), **rate)})
-    ports = inputs_of(ours)
-    sizes = [int(np.prod(shape)) for shape, _ in ports.values()]
+    ports = ours.ports("input")
+    sizes = [port.size for port in ports.values()]
     if sizes:
         system.add("drive", WhiteNoise(sample_period=h, n=sum(sizes), seed=8))
         first = np.cumsum([1, *sizes])
-        for (name, (shape, _)), a, size in zip(ports.items(), first, sizes, strict=False):
-            part = f"drive.y[{a}:{a + size - 1}]" if shape else f"drive.y[{a}]"
+        for (name, port), a, size in zip(ports.items(), first, sizes, strict=False):
+            part = f"drive.y[{a}:{a + size - 1}]" if port.shape else f"drive.y[{a}]"
             for member in ("ours", "fmu"):
                 system.connect(part, f"{member}.{name}")
-    wanted = [f"{m}.{port}" for m in ("ours", "fmu") for port in outputs_of(ours)]
+    wanted = [f"{m}.{port}" for m in ("ours", "fmu") for port in ours.declared_outputs]
     result = simulate(system, step=h, stop=steps * h, record=wanted, **options)
     return {port: result[port] for port in wanted}
 

@@ -14,7 +14,6 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim import FMU, Continuous, CosimError, Input, Output, State, System, simulate
-from cosim.system.system import is_block
 from fmus.export import ExportError, export
 from fmus.packaging.container import export_container
 from fmus.plants.oscillator import Oscillator
@@ -84,7 +83,7 @@ def test_the_same_bits_as_the_system(tmp_path, build, version, step):
     expected = simulate(system, step=step, stop=STOP)
     found = simulate(System({"it": FMU(path)}), step=step, stop=STOP)
     for name, signal in expected.signals.items():
-        late = int(is_block(system.participants[name.partition(".")[0]]))
+        late = int(system.participants[name.partition(".")[0]].as_block)
         whole = found[f"it.{name}"]
         # at t_0 the container has brought initial outputs to inputs, which we do when we step
         first = 1 if build is chain else late

@@ -319,7 +319,7 @@ def test_names_that_look_like_elements(tmp_path, names, expected):
     for old, new in zip(["x", "der(x)"], names, strict=True):
         text = text.replace(f'name="{old}"', f'name="{new}"')
     fmu = FMU(write(tmp_path / "names.fmu", text=text))
-    assert sorted(n for n in fmu.outputs if n[0] in "ab" and n != "b_out") == expected
+    assert sorted(n for n in fmu.output_ports if n[0] in "ab" and n != "b_out") == expected
 
 
 # ------------------------------------------------------------------------------ binaries

@@ -122,7 +122,9 @@ def test_texts_that_are_refused(path, start, words):
 @given(st.floats(-1e12, 1e12), st.sampled_from(["deg", " deg ", "rad", "\tmrad"]))
 def test_any_number_is_read(number, unit):
     """repr of a float is read back, with any unit after it, and nothing that is no float is."""
-    units = [SimpleNamespace(name="rad", displayUnits=[DisplayUnit("deg", factor=180.0 / math.pi)])]
+    units = [
+        SimpleNamespace(name="rad", baseUnit=None, displayUnits=[DisplayUnit("deg", factor=180.0 / math.pi)])
+    ]
     port = FMUPort("x", (), "rad", "Float64", (SimpleNamespace(relativeQuantity=None, declaredType=None),))
     factor = {"deg": math.pi / 180.0, "rad": 1.0, "mrad": 1e-3}[unit.strip()]
     read = without_units("f", port, units, f"{number!r}{unit}")

@@ -22,7 +22,7 @@ from cosim import (
     schedule,
     simulate,
 )
-from cosim.fmi.instance.model_exchange import LateEventWarning
+from cosim.errors import LateEventWarning
 from fmus.export import export
 from tests.cosim.fmi.ball import ball, height
 from tests.cosim.fmi.counter import counter

@@ -51,7 +51,7 @@ def test_texts_of_blocks_count_at_once(path):
     assert result.texts["c.echo"] == ["Grüße!!!"] * 3
     assert list(result.time) == [0.0, H, 2 * H]
     system = chain(path, as_block=True)
-    with pytest.raises(WiringError, match=r"algebraic cycle: .*c -> a"):
+    with pytest.raises(WiringError, match=r"algebraic cycle: .*c\.echo -> a\.word"):
         system.connect("c.echo", "a.word")
     assert len(system.text_connections) == 4
 
@@ -96,19 +96,19 @@ def test_texts_leave_as_ssp_and_come_back(path, tmp_path, version):
 def test_connections_that_are_refused(path):
     system = System({"a": FMU(path), "b": FMU(path), "r": Ramp()})
     for source, target, words in (
-        ("a.echo", "b.u", r"a\.echo is a String, and b\.u is a number: a String goes to a String"),
-        ("r.u", "b.word", r"r\.u is a number, and b\.word is a String"),
-        ("a.echo", "b.data", r"a\.echo is a String, and b\.data is a Binary"),
+        ("a.echo", "b.u", r"a\.echo is a String and b\.u is a number: a String goes to a String"),
+        ("r.u", "b.word", r"r\.u is a number and b\.word is a String"),
+        ("a.echo", "b.data", r"a\.echo is a String and b\.data is a Binary"),
         ("a.word", "b.word", r"a\.word is an input, not an output"),
         ("a.echo", "b.echo", r"b\.echo is an output, not an input"),
         ("a.echo", "b.wrod", r"b has no input 'wrod'"),
     ):
         with pytest.raises(WiringError, match=words):
             system.connect(source, target)
-    with pytest.raises(WiringError, match="texts cannot be delayed or transformed"):
+    with pytest.raises(WiringError, match="a String cannot be delayed or transformed"):
         system.connect("a.echo", "b.word", initial=0.0)
     system.connect("a.echo", "b.word")
     with pytest.raises(WiringError, match=r"b\.word is connected already, to a\.echo"):
         system.connect("a.echo", "b.word")
-    with pytest.raises(WiringError, match=r"a\.echo is text, not a number"):
+    with pytest.raises(WiringError, match=r"a\.echo is a String; statistics are of numbers"):
         simulate(system, step=H, stop=H, statistics=["a.echo"])
