@@ -8,6 +8,7 @@
 
 import math
 import sys
+from shutil import rmtree
 from typing import Any
 
 from fmpy import extract, read_model_description
@@ -25,7 +26,8 @@ def shake(path: str) -> list[float]:
     """Roof displacement at 0, H, 2 H, ..., m; a damper holds the roof to a fixed point."""
     description = read_model_description(path)
     reference = {v.name: v.valueReference for v in description.modelVariables}
-    building = instantiate_fmu(extract(path), description, "CoSimulation")
+    unpacked = extract(path)
+    building = instantiate_fmu(unpacked, description, "CoSimulation")
     building.setupExperiment(startTime=0.0)
     building.enterInitializationMode()
     building.exitInitializationMode()
@@ -37,6 +39,7 @@ def shake(path: str) -> list[float]:
         building.doStep(currentCommunicationPoint=k * H, communicationStepSize=H)
     building.terminate()
     building.freeInstance()
+    rmtree(unpacked)
     return roof
 
 

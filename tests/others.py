@@ -1,13 +1,20 @@
-"""Plants made by other people's tools: pythonfmu (FMI 2.0) and pythonfmu3 (FMI 3.0), in Python.
+"""Tools of other people: those that we compare with, and plants that pythonfmu made.
 
-Their libraries look for the Python that runs in the process, so they work where CPython is the master.
+The libraries that pythonfmu (FMI 2.0) and pythonfmu3 (FMI 3.0) write look for the Python that runs
+in the process, so they work where CPython is the master.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from cosim import CosimError
 
 _SWING = '''\
 from {package} import Fmi{n}Causality as Causality, Fmi{n}Slave, Fmi{n}Variability as Variability, {Real}
@@ -32,6 +39,14 @@ class Swing{n}(Fmi{n}Slave):
         self.x += h * self.v
         return True
 '''
+
+
+def tool(load: Callable[[], ModuleType]) -> ModuleType:
+    """Import a tool of fmus.packaging.other_tools, or skip the test and say in one line why."""
+    try:
+        return load()
+    except CosimError as error:
+        pytest.skip(str(error), allow_module_level=True)
 
 
 def swing(folder: Path, version: str) -> Path:

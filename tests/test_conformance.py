@@ -21,10 +21,10 @@ from cosim.cli.app import main
 from fmus.export import export
 from fmus.plants.oscillator import Oscillator
 from tests.conformance import FMUS, NONE, PASS, TABLE, Row, cited, markdown, rows
-from tests.cosim.fmi.isolation.test_isolation import children
 from tests.cosim.fmi.probe import probe
 from tests.fmus.export.host import building
 from tests.others import swing
+from tests.processes import children
 
 ROOT = Path(__file__).parents[1]
 

@@ -125,7 +125,8 @@ def surface(self: Any, T: float) -> None:
 def distance2(self: Any, i: int) -> float:
     total = 0.0
     for m in range(self.X.shape[0]):
-        total += (self.X[m] - self.c[i, m]) ** 2
+        gap = self.X[m] - self.c[i, m]
+        total += gap * gap
     return total
 
 
@@ -140,7 +141,8 @@ def hidden_layer(self: Any) -> None:
     for i in range(int(self.h)):
         zeta2 = 0.0
         for m in range(n):
-            zeta2 += ((self.X[m] - self.c[i, m]) / self.sigma[i, m]) ** 2
+            zeta = (self.X[m] - self.c[i, m]) / self.sigma[i, m]
+            zeta2 += zeta * zeta
         self.phi[i] = _MEXICAN_HAT * (1.0 - zeta2) * exp(-0.5 * zeta2)
 
 
@@ -198,13 +200,14 @@ def adapt_nodes(self: Any, T: float) -> None:
             pull += s * (w + u * theta)
         zeta2 = 0.0
         for m in range(n):
-            zeta2 += ((self.X[m] - self.c[i, m]) / self.sigma[i, m]) ** 2
+            zeta = (self.X[m] - self.c[i, m]) / self.sigma[i, m]
+            zeta2 += zeta * zeta
         slope = _MEXICAN_HAT * exp(-0.5 * zeta2) * 0.5 * (zeta2 - 3.0)
         for m in range(n):
             gap = self.X[m] - self.c[i, m]
             width = self.sigma[i, m]
-            self.sigma[i, m] += T * self.eta_sigma * pull * slope * -2.0 * gap * gap / width**3
-            self.c[i, m] += T * self.eta_c * pull * slope * -2.0 * gap / width**2
+            self.sigma[i, m] += T * self.eta_sigma * pull * slope * -2.0 * gap * gap / (width * width * width)
+            self.c[i, m] += T * self.eta_c * pull * slope * -2.0 * gap / (width * width)
             if self.sigma[i, m] < 1e-3:
                 self.sigma[i, m] = 1e-3
 
@@ -214,12 +217,12 @@ def grow(self: Any) -> None:
     p, n, nodes = self.x.shape[0], self.X.shape[0], int(self.h)
     error2 = 0.0
     for j in range(p):
-        error2 += self.x[j] ** 2
+        error2 += self.x[j] * self.x[j]
     m = self.errors.shape[0]
     self.errors[int(self.i) % m] = error2
     total = 0.0
     for k in range(m):
-        total += self.errors[k] / m**2
+        total += self.errors[k] / (m * m)
     nearest = distance2(self, 0)
     for i in range(1, nodes):
         nearest = min(nearest, distance2(self, i))

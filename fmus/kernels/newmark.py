@@ -128,7 +128,7 @@ def prepare(s: Any, h: float) -> None:
         for p in range(s.A.shape[0]):
             s.A[p] = s.K[p] + 2.0 / h_level * s.C[p]
         for j in range(n):
-            s.A[int(s.A_diagonal[j])] += 4.0 / h_level**2 * s.M[j]
+            s.A[int(s.A_diagonal[j])] += 4.0 / (h_level * h_level) * s.M[j]
         bad = factor(
             s.A_start, s.A_row, s.A, s.L_start, s.parent, level,
             s.L_row, s.L, s.D_inv, s.load, s.dx, s.path, s.fill,

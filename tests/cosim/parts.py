@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cosim import Block, Continuous, Input, LinearContinuous, Output, Parameter, State
+from cosim import FMU, Block, Continuous, Input, LinearContinuous, Output, Parameter, State, System
 
 
 class Ramp(Block):
@@ -84,3 +84,54 @@ class Through(Continuous):
 
     def outputs(self, t):
         self.y = self.u + self.x
+
+
+class Three(Block):
+    """y = (1, 20, 300) x_i + t; M = [[1, 2, 3], [4, 5, 6]]"""
+
+    x = Input(shape=3)
+    y = Output(shape=3)
+    M = Output(shape=(2, 3))
+    accel = Output(unit="m/s^2")
+
+    def step(self, t, h):
+        self.y[0] = self.x[0] + 1.0
+        self.y[1] = self.x[1] + 20.0
+        self.y[2] = self.x[2] + 300.0
+        for i in range(2):
+            for j in range(3):
+                self.M[i, j] = 3.0 * i + j + 1.0
+
+
+class Diverges(Continuous):
+    """x' = x^2: infinite at t = 1 / x0 = 0.5, whatever the solver makes of it; no outputs."""
+
+    x = State(2.0)
+
+    def derivatives(self, t):
+        self.der_x = self.x * self.x
+
+
+class Chain(LinearContinuous):
+    """Two masses, two forces, accelerations as feedthrough outputs, not symmetric."""
+
+    k = Parameter(3.0)
+    u = Input(shape=2)
+    x = State([0.5, -0.2], shape=2)
+    v = State([0.1, 0.7], shape=2)
+    a = Output(shape=2)
+
+    def derivatives(self, t):
+        self.der_x[0] = self.v[0]
+        self.der_x[1] = self.v[1]
+        self.der_v[0] = self.u[0] - self.k * self.x[0] + 0.4 * self.x[1] - 0.1 * self.v[0]
+        self.der_v[1] = 0.5 * self.u[1] + 0.3 * self.x[0] - 2.0 * self.x[1]
+
+    def outputs(self, t):
+        self.a[0] = self.der_v[0]
+        self.a[1] = self.der_v[1]
+
+
+def closed(plant: Continuous | FMU) -> System:
+    """Close a loop around a Chain: the second mass is watched, the first one is pushed."""
+    return System({"plant": plant, "g": Gain(K=-0.8)}, [("plant.x[2]", "g.x"), ("g.u", "plant.u[1]")])

@@ -13,8 +13,7 @@ from hypothesis.extra import numpy as hnp
 
 import cosim.run.simulation
 from cosim import RecordError, Result, Statistics, System, WiringError, simulate
-from tests.cosim.parts import Counter, Gain, Mass
-from tests.cosim.system.test_system import Three
+from tests.cosim.parts import Counter, Gain, Mass, Three
 
 
 def loop() -> System:

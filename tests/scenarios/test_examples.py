@@ -97,7 +97,7 @@ def test_the_loop_imports_fmpy_only() -> None:
     tree = ast.parse((SCENARIOS / "building_in_fmpy.py").read_text())
     names = {(n.module if isinstance(n, ast.ImportFrom) else n.names[0].name).split(".")[0]
              for n in tree.body if isinstance(n, (ast.Import, ast.ImportFrom))}  # fmt: skip
-    assert names == {"math", "sys", "typing", "fmpy"}
+    assert names == {"math", "shutil", "sys", "typing", "fmpy"}
 
 
 def test_a_controller_in_an_ssp(tmp_path: Path) -> None:

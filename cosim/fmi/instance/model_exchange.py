@@ -108,8 +108,9 @@ class ModelExchangeInstance(EventInstance):
     def _combine(self, base: int, weights: list[float]) -> Op:
         slopes = base + 8 * self.n_states
         return Op(
-            "", COMBINE, a=base, b=slopes, c=self.state_address, n=self.n_states, weights=tuple(weights)
-        )
+            "", COMBINE, a=base, b=slopes, c=self.state_address, n=self.n_states, weights=tuple(weights),
+            participant=self.name,
+        )  # fmt: skip
 
     def _vector(self, name: str, address: int) -> Op:
         n = self.n_states

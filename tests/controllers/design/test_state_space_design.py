@@ -16,8 +16,6 @@ from controllers.laws.state_feedback import StateFeedback, weight_outputs
 from controllers.observers.observer import Observer, discretise, observer_gain
 from cosim import Array
 
-RNG = np.random.default_rng(7)
-
 
 def chain(n: int = 6) -> tuple[Array, Array, Array]:
     """A chain of unequal masses, springs and dashpots."""
@@ -75,10 +73,10 @@ def test_whole_system_is_not_changed_by_the_reduction() -> None:
     np.testing.assert_allclose(model.C, first_order(M, C, K)[[6]], atol=1e-9)
 
 
-def test_regulator_is_that_of_control() -> None:
+def test_regulator_is_that_of_control(rng: np.random.Generator) -> None:
     """Two actuators, cross term; `control.lqr` solves the same equation, both to about 1e-12."""
-    A, B = RNG.normal(size=(5, 5)), RNG.normal(size=(5, 2))
-    root = RNG.normal(size=(7, 7))
+    A, B = rng.normal(size=(5, 5)), rng.normal(size=(5, 2))
+    root = rng.normal(size=(7, 7))
     W = root @ root.T
     Q, N, R = W[:5, :5], W[:5, 5:], W[5:, 5:]
     X, gain = regulator(A, B, Q, R, N)
@@ -157,13 +155,13 @@ def test_observer_converges_from_a_wrong_state() -> None:
     assert np.abs(observer.x_hat - x).max() < 0.02 * first
 
 
-def test_sliding_mode_moves_as_designed() -> None:
+def test_sliding_mode_moves_as_designed(rng: np.random.Generator) -> None:
     """s' = -a s - delta sgn s in the model (2.14); linear part: one eigenvalue -a, the others stable."""
     model = reduced()
     Q = np.diag([5.0, 3.0, 2.0, 1.0, 1.0, 0.3])
     law = SlidingMode.design(model, Q, a=2.0, delta=0.01)
     A, B, P = model.A, model.B, law.P
-    x = RNG.normal(size=6)
+    x = rng.normal(size=6)
     law.x_hat[:] = x
     law.step(0.0, 0.01)
     s_dot = P @ (A @ x + B @ law.u)
@@ -176,10 +174,10 @@ def test_sliding_mode_moves_as_designed() -> None:
     assert values.real.max() < 0.0
 
 
-def test_sliding_surface_is_optimal() -> None:
+def test_sliding_surface_is_optimal(rng: np.random.Generator) -> None:
     """Any other surface costs more: the Lyapunov cost of x_2 = -P_1 z_1 is least at P_1 (two actuators)."""
-    A, B = RNG.normal(size=(5, 5)), np.vstack([np.zeros((3, 2)), RNG.normal(size=(2, 2)) + 2 * np.eye(2)])
-    root = RNG.normal(size=(5, 5))
+    A, B = rng.normal(size=(5, 5)), np.vstack([np.zeros((3, 2)), rng.normal(size=(2, 2)) + 2 * np.eye(2)])
+    root = rng.normal(size=(5, 5))
     Q = root @ root.T + np.eye(5)
     P = optimal_surface(A, B, Q)
     np.testing.assert_allclose(P[:, 3:], np.eye(2), atol=1e-12)
@@ -193,24 +191,24 @@ def test_sliding_surface_is_optimal() -> None:
 
     best = cost(P[:, :3])
     for _ in range(20):
-        assert cost(P[:, :3] + 1e-3 * RNG.normal(size=(2, 3))) > best
+        assert cost(P[:, :3] + 1e-3 * rng.normal(size=(2, 3))) > best
 
 
-def test_continuous_sliding_mode_is_linear_and_approaches_at_its_rate() -> None:
+def test_continuous_sliding_mode_is_linear_and_approaches_at_its_rate(rng: np.random.Generator) -> None:
     model = reduced()
     law = ContinuousSlidingMode.design(model, np.diag([5.0, 3.0, 2.0, 1.0, 1.0, 0.3]), rate=1.5)
-    x = RNG.normal(size=6)
+    x = rng.normal(size=6)
     law.x_hat[:] = x
     law.step(0.0, 0.01)
     np.testing.assert_allclose(law.P @ (model.A @ x + model.B @ law.u), -1.5 * (law.P @ x), rtol=1e-9)
 
 
-def test_force_in_two_blocks_is_the_force_in_one() -> None:
+def test_force_in_two_blocks_is_the_force_in_one(rng: np.random.Generator) -> None:
     """With switching = -M sgn s the two blocks are (2.15), to round-off."""
     model, Q = reduced(), np.diag([5.0, 3.0, 2.0, 1.0, 1.0, 0.3])
     one = SlidingMode.design(model, Q, a=0.7, delta=0.02)
     surface, force = equivalent_force(model, Q)
-    x = RNG.normal(size=6)
+    x = rng.normal(size=6)
     one.x_hat[:] = surface.x_hat[:] = force.x_hat[:] = x
     one.step(0.0, 0.01)
     surface.step(0.0, 0.01)
@@ -219,11 +217,11 @@ def test_force_in_two_blocks_is_the_force_in_one() -> None:
     assert force.u == pytest.approx(float(one.u[0]), rel=1e-12)
 
 
-def test_output_weights() -> None:
+def test_output_weights(rng: np.random.Generator) -> None:
     """z' W z expanded by hand."""
-    C, D, W = RNG.normal(size=(3, 4)), RNG.normal(size=(3, 2)), np.diag([1.0, 2.0, 3.0])
+    C, D, W = rng.normal(size=(3, 4)), rng.normal(size=(3, 2)), np.diag([1.0, 2.0, 3.0])
     Q, N, R = weight_outputs(C, D, W)
-    x, u = RNG.normal(size=4), RNG.normal(size=2)
+    x, u = rng.normal(size=4), rng.normal(size=2)
     z = C @ x + D @ u
     assert x @ Q @ x + 2 * x @ N @ u + u @ R @ u == pytest.approx(z @ W @ z, rel=1e-12)
     assert StateFeedback.lqr(

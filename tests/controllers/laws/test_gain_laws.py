@@ -14,7 +14,6 @@ from controllers.laws.state_dependent import StateDependentGain
 from controllers.laws.switching import HysteresisControl, SaturationControl
 from tests.cosim.blocks.drive import assert_same_bits, trace
 
-RNG = np.random.default_rng(4)
 LAWS = {
     "constant": ConstantGain,
     "algorithm 1": AlgorithmI,
@@ -30,9 +29,9 @@ signs = st.lists(st.sampled_from([-2.0, -0.3, 0.0, 0.3, 2.0]), min_size=1, max_s
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_interpreted_is_compiled(name):
+def test_interpreted_is_compiled(rng, name):
     law = LAWS[name]()
-    inputs = RNG.normal(size=(80, law.zones["input"][1]))
+    inputs = rng.normal(size=(80, law.zones["input"][1]))
     inputs[::7] = 0.0
     assert_same_bits(law, inputs, 0.01)
 

@@ -8,8 +8,6 @@ import pytest
 from cosim import Block, Output, System, simulate
 from cosim.blocks import DiscreteLowPass, FirstOrderActuator, LowPass, RecordSource
 
-RNG = np.random.default_rng(8)
-
 
 @pytest.mark.parametrize("h", [1e-5, 0.01, 0.1, 3.0])
 def test_step_response(h):
@@ -32,9 +30,9 @@ def test_a_held_input_arrives_one_step_later():
     assert y[2:] == pytest.approx([a, a * (1 - a)], rel=1e-15)
 
 
-def test_block_and_continuous_filter_agree():
+def test_block_and_continuous_filter_agree(rng):
     """t_k - t_{k-1} is h to 1e-13 relative (t up to 5 s); a shift by one sample changes y by about 0.1."""
-    values = RNG.normal(size=501)
+    values = rng.normal(size=501)
     system = System(
         {
             "s": RecordSource(values, 0.01),
@@ -68,8 +66,8 @@ def test_stage_coupling_converges_to_it(participant):
     assert 1e-9 < np.abs(error).max() < 2e-5
 
 
-def test_actuator_never_exceeds_its_limit():
-    values = RNG.normal(scale=5.0, size=301)
+def test_actuator_never_exceeds_its_limit(rng):
+    values = rng.normal(scale=5.0, size=301)
     system = System(
         {"s": RecordSource(values, 0.01), "a": FirstOrderActuator(0.02, 1.5)}, [("s.y", "a.u[1]")]
     )

@@ -9,7 +9,6 @@ from cosim.blocks import SensorDynamics, StateSpace, StrictlyProper, transfer_fu
 from cosim.core.dependencies import dependencies
 from tests.cosim.blocks.drive import trace
 
-RNG = np.random.default_rng(5)
 #: Both sides are exact but for rounding: 300 steps of some ten operations at 1.1e-16, and
 #: the matrix exponentials of either side, stay below 1e-12 of the largest output. An input
 #: shifted by one sample is off by the size of the output itself.
@@ -29,9 +28,9 @@ def held(A, B, C, D, u, h):
 
 
 @pytest.mark.parametrize("h", [1e-4, 0.01, 0.3])
-def test_sensor_dynamics(h):
+def test_sensor_dynamics(rng, h):
     """1/(mu s + 1)^2 in closed form; y is a state, advanced over the step, so y_0 = 0 comes first."""
-    mu, u = 0.008, RNG.normal(size=(300, 1))
+    mu, u = 0.008, rng.normal(size=(300, 1))
     A, B = np.array([[0.0, 1.0], [-1 / mu**2, -2 / mu]]), np.array([[0.0], [1 / mu**2]])
     expected = held(A, B, np.array([[1.0, 0.0]]), np.zeros((1, 1)), u, h)
     y = np.vstack([[[0.0]], trace(SensorDynamics(mu), u, h, "y")[:-1]])
@@ -45,9 +44,9 @@ def test_sensor_dynamics_step_response():
         assert abs(y - (1 - (1 + t / 0.008) * np.exp(-t / 0.008))) < 1e-15
 
 
-def test_sensor_channels_are_independent():
+def test_sensor_channels_are_independent(rng):
     """Closed form a channel: bit for bit the single sensor's."""
-    u = RNG.normal(size=(50, 3))
+    u = rng.normal(size=(50, 3))
     three = trace(SensorDynamics(n=3), u, 0.01, "y")
     for i in range(3):
         assert np.array_equal(three[:, i : i + 1], trace(SensorDynamics(n=1), u[:, i : i + 1], 0.01, "y"))
@@ -61,9 +60,9 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_transfer_function(name):
+def test_transfer_function(rng, name):
     numerator, denominator = MODELS[name]
-    u = RNG.normal(size=(300, 1))
+    u = rng.normal(size=(300, 1))
     sensor = transfer_function((numerator, denominator))
     matrices = signal.tf2ss(numerator, denominator)
     y, expected = trace(sensor, u, 0.01, "y"), held(*matrices, u, 0.01)
@@ -72,21 +71,21 @@ def test_transfer_function(name):
     assert np.abs(y - expected).max() < EXACT * np.abs(expected).max()
 
 
-def test_against_lsim():
+def test_against_lsim(rng):
     """SciPy's own simulation of the thesis' sensor with held inputs (interp=False)."""
-    u, h = RNG.normal(size=(200, 1)), 0.01
+    u, h = rng.normal(size=(200, 1)), 0.01
     model = signal.TransferFunction([1.0], [0.008**2, 0.016, 1.0])
     _, expected, _ = signal.lsim(model, u[:, 0], np.arange(200) * h, interp=False)
     y = trace(transfer_function(model), u, h, "y")[:, 0]
     assert np.abs(y - expected).max() < EXACT * np.abs(expected).max()
 
 
-def test_takes_a_model_of_control():
+def test_takes_a_model_of_control(rng):
     import control
 
     pair = ([2.0, 1.0], [0.001, 0.08, 1.3, 4.0])
     model = control.tf(*pair)
-    u = RNG.normal(size=(40, 1))
+    u = rng.normal(size=(40, 1))
     assert np.array_equal(
         trace(transfer_function(model), u, 0.01, "y"), trace(transfer_function(pair), u, 0.01, "y")
     )
@@ -107,11 +106,11 @@ def test_control_is_not_imported_for_it():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_state_space_of_any_size():
+def test_state_space_of_any_size(rng):
     """Two inputs, three outputs, four states: a transposed matrix would not fit."""
-    A, B, C, D = (RNG.normal(size=s) for s in ((4, 4), (4, 2), (3, 4), (3, 2)))
+    A, B, C, D = (rng.normal(size=s) for s in ((4, 4), (4, 2), (3, 4), (3, 2)))
     A -= 3.0 * np.eye(4)
-    u = RNG.normal(size=(200, 2))
+    u = rng.normal(size=(200, 2))
     expected = held(A, B, C, D, u, 0.02) + (u - np.vstack([np.zeros((1, 2)), u[:-1]])) @ D.T
     assert (
         np.abs(trace(StateSpace(A, B, C, D), u, 0.02, "y") - expected).max() < EXACT * np.abs(expected).max()

@@ -33,9 +33,9 @@ from cosim.cli.fmu_scenario import fmu_scenario
 from cosim.cli.input_table import connect_inputs
 from fmus.export import DefaultExperiment, export
 from tests.cosim.fmi.ball import ball
-from tests.cosim.fmi.isolation.test_isolation import crash
+from tests.cosim.fmi.crash import crash
 from tests.cosim.fmi.probe import probe
-from tests.cosim.fmi.test_fmu import Chain
+from tests.cosim.parts import Chain
 
 
 @pytest.fixture(scope="module")

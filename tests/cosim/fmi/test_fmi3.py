@@ -31,8 +31,7 @@ from cosim.loop.loop import _Writer
 from cosim.loop.operations import TO_FLOAT, Op
 from fmus.export import export
 from tests.cosim.fmi.probe import INTEGERS, probe
-from tests.cosim.fmi.test_fmu import Chain, closed
-from tests.cosim.parts import Counter, Mass, Ramp
+from tests.cosim.parts import Chain, Counter, Mass, Ramp, closed
 
 VERSIONS = ["2.0", "3.0"]
 SAMPLED, STAGES = {}, {"coupling": "continuous", "solver": "ode1"}

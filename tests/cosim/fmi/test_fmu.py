@@ -12,49 +12,18 @@ import pytest
 from cosim import (
     FMU,
     FMUError,
-    Input,
-    LinearContinuous,
-    Output,
-    Parameter,
     SimulationError,
-    State,
     System,
     WiringError,
     simulate,
 )
 from fmus.export import DefaultExperiment, export
-from tests.cosim.parts import Gain
-from tests.cosim.run.test_faults import Diverges
-
-
-class Chain(LinearContinuous):
-    """Two masses, two forces, accelerations as feedthrough outputs, not symmetric."""
-
-    k = Parameter(3.0)
-    u = Input(shape=2)
-    x = State([0.5, -0.2], shape=2)
-    v = State([0.1, 0.7], shape=2)
-    a = Output(shape=2)
-
-    def derivatives(self, t):
-        self.der_x[0] = self.v[0]
-        self.der_x[1] = self.v[1]
-        self.der_v[0] = self.u[0] - self.k * self.x[0] + 0.4 * self.x[1] - 0.1 * self.v[0]
-        self.der_v[1] = 0.5 * self.u[1] + 0.3 * self.x[0] - 2.0 * self.x[1]
-
-    def outputs(self, t):
-        self.a[0] = self.der_v[0]
-        self.a[1] = self.der_v[1]
+from tests.cosim.parts import Chain, Diverges, closed
 
 
 @pytest.fixture(scope="module")
 def fmu_path(tmp_path_factory):
     return export(Chain(), tmp_path_factory.mktemp("fmu") / "chain.fmu")
-
-
-def closed(plant) -> System:
-    """The second mass is watched, the first one pushed."""
-    return System({"plant": plant, "g": Gain(K=-0.8)}, [("plant.x[2]", "g.x"), ("g.u", "plant.u[1]")])
 
 
 @pytest.mark.parametrize("options", [{}, {"coupling": "continuous", "solver": "ode4"}])

@@ -27,7 +27,7 @@ from cosim import (
     simulate,
 )
 from cosim.errors import CompiledKernelsWarning
-from tests.cosim.parts import Counter, Gain, Mass, Ramp
+from tests.cosim.parts import Counter, Diverges, Gain, Mass, Ramp
 
 
 class TurnsNaN(Block):
@@ -38,15 +38,6 @@ class TurnsNaN(Block):
     def step(self, t, h):
         self.y[0] = t
         self.y[1] = (1.0 - t) ** 0.5
-
-
-class Diverges(Continuous):
-    """x' = x^2: infinite at t = 1 / x0 = 0.5, whatever the solver makes of it; no outputs."""
-
-    x = State(2.0)
-
-    def derivatives(self, t):
-        self.der_x = self.x * self.x
 
 
 @pytest.mark.parametrize("jit", [True, False])
@@ -219,7 +210,7 @@ def test_ctrl_c_while_a_block_is_initialized():
 
 
 SIGNAL = """
-    import os, signal, sys, threading, time
+    import os, signal, threading
     from cosim import Block, State, System, simulate, Interrupted
 
     class Counter(Block):
@@ -231,22 +222,30 @@ SIGNAL = """
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
     simulate(System({{"c": Counter()}}), step=1.0, stop=10.0)  # compile first
-    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
-    began = time.perf_counter()
+    presses = []
+
+    def press(k, n):
+        if not presses:  # the loop runs by now
+            presses.append(threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)))
+            presses[0].start()
+
+    options = {{"record": ["c.n"], "decimation": 1000000, "progress": press}}
     try:
-        simulate(System({{"c": Counter()}}), step=1.0, stop=4e9, record=["c.n"], decimation=1000000)
+        simulate(System({{"c": Counter()}}), step=1.0, stop=4e12, **options)
     except Interrupted as interrupted:
         result = interrupted.result
         assert result.interrupted and len(result.time) == len(result["c.n"]) > 0
-        assert time.perf_counter() - began < 3.0
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
         print("interrupted")
 """
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_ctrl_c_stops_a_run_within_seconds(compiled):
-    """A process of its own gets the signal. In callbacks Python would print the exception and run on."""
+def test_ctrl_c_stops_a_run(compiled):
+    """A process of its own gets the signal; its run alone would take hours.
+
+    In callbacks Python would print the exception and run on.
+    """
     script = textwrap.dedent(SIGNAL.format(compiled=compiled))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
     assert done.stdout.strip() == "interrupted", done.stderr

@@ -26,8 +26,7 @@ from cosim import (
 from cosim.blocks import SensorDynamics, WhiteNoise
 from fmus.export import export
 from tests.cosim.fmi.probe import changed, probe
-from tests.cosim.fmi.test_fmu import Chain
-from tests.cosim.parts import Gain, Mass
+from tests.cosim.parts import Chain, Gain, Mass
 
 
 class Remembers(Block):

@@ -10,24 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim import Block, CosimError, Input, Output, Parameter, System, WiringError, schedule, simulate
-from tests.cosim.parts import Gain, Mass, Ramp
-
-
-class Three(Block):
-    """y = (1, 20, 300) x_i + t; M = [[1, 2, 3], [4, 5, 6]]"""
-
-    x = Input(shape=3)
-    y = Output(shape=3)
-    M = Output(shape=(2, 3))
-    accel = Output(unit="m/s^2")
-
-    def step(self, t, h):
-        self.y[0] = self.x[0] + 1.0
-        self.y[1] = self.x[1] + 20.0
-        self.y[2] = self.x[2] + 300.0
-        for i in range(2):
-            for j in range(3):
-                self.M[i, j] = 3.0 * i + j + 1.0
+from tests.cosim.parts import Gain, Mass, Ramp, Three
 
 
 def value_of(system: System, port: str):

@@ -40,12 +40,14 @@ from cosim import FMU, Array, Block, Participant, System, simulate
 from cosim.blocks import LowPass, WhiteNoise
 from cosim.core.port import Port
 from fmus.export import export
+from fmus.packaging.other_tools import ecospy
 from fmus.plants.damped_tower import DampedTower
 from fmus.plants.oscillator import Oscillator
 from scenarios.tall_building.building import Damper
 from tests.fmus.export.every_class import model
 from tests.fmus.export.host import building
 from tests.fmus.plants.towers import small_tower
+from tests.others import tool
 
 
 @dataclass
@@ -186,9 +188,8 @@ def same_bits(found: dict[str, Array], expected: dict[str, Array]) -> None:
 
 def in_ecos(loop: Loop, system: System, paths: dict[str, Path]) -> dict[str, Array]:
     """Values after each step: ecos has got the next inputs then, so outputs with feedthrough are no use."""
-    from ecospy import EcosSimulation, EcosSimulationStructure
-
-    structure = EcosSimulationStructure()
+    ecos = tool(ecospy)
+    structure = ecos.EcosSimulationStructure()
     for name, path in paths.items():
         structure.add_model(name, str(path))
     for c in system.connections:
@@ -198,7 +199,7 @@ def in_ecos(loop: Loop, system: System, paths: dict[str, Path]) -> dict[str, Arr
             )
     ports = {name: system.port(name, "output") for name in loop.compared}
     rows: dict[str, list[list[float]]] = {name: [] for name in ports}
-    with EcosSimulation(step_size=loop.h, structure=structure) as simulation:
+    with ecos.EcosSimulation(step_size=loop.h, structure=structure) as simulation:
         simulation.init(0.0)
         for _ in range(loop.steps):
             simulation.step(1)

@@ -17,9 +17,11 @@ from scipy.linalg import eigh
 from scipy.signal import cont2discrete
 
 from fmus.export.fmu import FMI_VERSIONS
+from fmus.packaging.other_tools import ecospy
 from fmus.plants.oscillator import Oscillator
 from fmus.plants.shear_building import ShearBuilding, stiffness_matrix
 from tests.fmus.export.host import CO_SIMULATION, MODEL_EXCHANGE, OK, Accumulator, Host, Root
+from tests.others import tool
 
 EXACT = 1e-12
 STEPS, H = 1000, 0.01
@@ -175,11 +177,10 @@ def test_cvode_agrees_with_the_exact_solution(fmu_of: Callable[..., Path]) -> No
 @pytest.mark.parametrize("version", FMI_VERSIONS)
 def test_ecos_computes_the_same(fmu_of: Callable[..., Path], version: str) -> None:
     """ecos steps by its own master: input set once, a hundred steps."""
-    from ecospy import EcosSimulation, EcosSimulationStructure
-
-    structure = EcosSimulationStructure()
+    ecos = tool(ecospy)
+    structure = ecos.EcosSimulationStructure()
     structure.add_model("plant", str(fmu_of("oscillator", version)))
-    simulation = EcosSimulation(step_size=H, structure=structure)
+    simulation = ecos.EcosSimulation(step_size=H, structure=structure)
     simulation.init(0.0)
     simulation.set_real("plant::u", 2.0)
     simulation.step(100)
@@ -195,11 +196,10 @@ def test_ecos_computes_the_same(fmu_of: Callable[..., Path], version: str) -> No
 
 def test_ecos_computes_the_same_building(fmu_of: Callable[..., Path]) -> None:
     """Ground acceleration and a force on the second floor, from rest; FMI 2.0, where arrays are scalars."""
-    from ecospy import EcosSimulation, EcosSimulationStructure
-
-    structure = EcosSimulationStructure()
+    ecos = tool(ecospy)
+    structure = ecos.EcosSimulationStructure()
     structure.add_model("b", str(fmu_of("building", "2.0")))
-    simulation = EcosSimulation(step_size=H, structure=structure)
+    simulation = ecos.EcosSimulation(step_size=H, structure=structure)
     simulation.init(0.0)
     simulation.set_real("b::ground_acceleration", 0.7)
     simulation.set_real("b::force[2]", 5.0)

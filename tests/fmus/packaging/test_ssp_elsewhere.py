@@ -7,25 +7,23 @@ all are stepped, blocks as well. That is our own loop with every FMU as a plain 
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 
 from cosim import Block, Continuous, Input, Output, Parameter, State, System, WiringError, read_ssp, simulate
+from fmus.packaging.other_tools import ecospy
 from fmus.packaging.ssp import PARAMETER_SET, export_ssp
 from tests.fmus.packaging.ssp_parts import Damper, Frame
+from tests.others import tool
 
 H, N = 0.005, 400
 
 
 def ecos(path: str, ports: Sequence[str]) -> np.ndarray:
-    ctypes.CDLL("libtbb.so.12")  # without it ecospy does not load, and says less
-    from ecospy import EcosSimulation
-
     rows = []
-    with EcosSimulation(step_size=H, ssp_path=path) as sim:
+    with tool(ecospy).EcosSimulation(step_size=H, ssp_path=path) as sim:
         sim.init(parameter_set=PARAMETER_SET)
         for k in range(N + 1):
             if k:

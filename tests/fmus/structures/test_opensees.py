@@ -1,7 +1,6 @@
 """OpenSees as an independent implementation: uniaxial materials, and a frame that becomes a plant.
 
-Needs openseespy, which on Linux needs libblas.so.3 of the system; where it cannot be imported, that
-is said.
+Where openseespy cannot be imported, the module is skipped with the reason.
 """
 
 from __future__ import annotations
@@ -9,20 +8,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from cosim import System, simulate
 from fmus.elements.bilinear import bilinear
 from fmus.elements.bouc_wen import bouc_wen
+from fmus.packaging.other_tools import opensees
 from fmus.plants.nonlinear_structure import NonlinearStructure
 from fmus.structures.opensees import opensees_model
 from tests.fmus.elements.paths import drive
 from tests.fmus.plants.chains import Held
+from tests.others import tool
 
-try:
-    import openseespy.opensees as ops
-except (ImportError, RuntimeError) as error:
-    pytest.skip(f"openseespy cannot be imported: {error}", allow_module_level=True)
+ops = tool(opensees)
 
 PATH = 0.08 * np.sin(np.linspace(0.0, 14.0, 2001)) * np.linspace(0.1, 1.0, 2001)
 

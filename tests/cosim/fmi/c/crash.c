@@ -3,7 +3,8 @@
    The GUID of its model description says how: "FUNCTION WAY TIME", such as "DoStep null 0.5", makes
    fmi2DoStep write to address 0 when the time it was told is 0.5 or later. Before that it logs a line.
    "FUNCTION fatal TIME" answers fmi2Fatal, and crashes when it is called once more to be freed.
-   With CRASH_AT_LOAD in the environment, the library aborts when it is loaded. */
+   With CRASH_AT_LOAD in the environment, the library aborts when it is loaded. "hang" makes the file
+   that CRASH_HANGS names, then hangs. */
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,6 +31,8 @@ static void crash(P, const char *function) {
     if (strcmp(p->way, "null") == 0) *(volatile int *)0 = 1;
     if (strcmp(p->way, "abort") == 0) abort();
     if (strcmp(p->way, "exit") == 0) exit(3);
+    const char *mark = getenv("CRASH_HANGS");
+    if (strcmp(p->way, "hang") == 0 && mark) fclose(fopen(mark, "w"));
     while (strcmp(p->way, "hang") == 0) sleep(1);
 }
 

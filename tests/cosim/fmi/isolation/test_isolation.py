@@ -22,30 +22,15 @@ from cosim.fmi.instance.fmi3 import Fmi3
 from cosim.loop.signals import Failures
 from fmus.export import export
 from tests.cosim.fmi.ball import ball
+from tests.cosim.fmi.crash import crash
 from tests.cosim.fmi.metronome import metronome
-from tests.cosim.fmi.probe import probe, write_fmu
-from tests.cosim.fmi.test_fmu import Chain, closed
+from tests.cosim.fmi.probe import probe
+from tests.cosim.parts import Chain, closed
+from tests.processes import children
 
 H = 0.0625  # a binary fraction: times are exact
 VERSIONS = ["2.0", "3.0"]
 INTERFACES = ["CoSimulation", "ModelExchange"]
-
-
-def crash(folder: Path, fault: str = "none", interface: str = "CoSimulation") -> FMU:
-    """The FMU of c/crash.c."""
-    folder.mkdir(exist_ok=True)
-    text = f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="crash" guid="{fault}">
-<{interface} modelIdentifier="crash" canGetAndSetFMUstate="true" canSerializeFMUstate="true"/><ModelVariables>
-<ScalarVariable name="u" valueReference="0" causality="input"><Real start="1"/></ScalarVariable>
-<ScalarVariable name="x" valueReference="1" causality="output" initial="exact"><Real start="0"/>
-</ScalarVariable>
-<ScalarVariable name="der(x)" valueReference="2"><Real derivative="2"/></ScalarVariable>
-<ScalarVariable name="y" valueReference="3" causality="output"><Real/></ScalarVariable>
-</ModelVariables><ModelStructure><Outputs><Unknown index="2"/><Unknown index="4"/></Outputs>
-<Derivatives><Unknown index="3"/></Derivatives><InitialUnknowns><Unknown index="4"/></InitialUnknowns>
-</ModelStructure></fmiModelDescription>"""
-    return FMU(write_fmu(folder / "crash.fmu", text, "crash", "crash.c"), isolated=True)
 
 
 class One(Block):
@@ -59,19 +44,6 @@ class One(Block):
 
 def driven(plant: FMU) -> System:
     return System({"plant": plant, "one": One()}, [("one.u", "plant.u")])
-
-
-def children(parent: int) -> set[int]:
-    """The processes that a process has started and not waited for, zombies too."""
-    found = set()
-    for entry in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = entry.read_text().rpartition(")")[2].split()
-        except OSError:  # it has ended meanwhile
-            continue
-        if int(fields[1]) == parent:
-            found.add(int(entry.parent.name))
-    return found
 
 
 @pytest.fixture(autouse=True)
@@ -191,12 +163,18 @@ def instance(adapter, fmu):
 @pytest.mark.parametrize("version", VERSIONS)
 def test_the_fmu_is_in_the_other_process_only(tmp_path, version):
     """Versions of FMI find their library differently in FMPy; the same bits prove nothing here."""
+
+    def mapped(process: int) -> set[str]:
+        lines = Path(f"/proc/{process}/maps").read_text().splitlines()
+        return {line.split()[-1] for line in lines if "/probe.so" in line}
+
+    before = mapped(os.getpid())  # those of earlier tests
     with instance(
         {"2.0": Fmi2, "3.0": Fmi3}[version], FMU(probe(tmp_path / "probe.fmu", version), isolated=True)
     ):
         (child,) = children(os.getpid())
-        assert "/probe.so" in Path(f"/proc/{child}/maps").read_text()
-        assert "/probe.so" not in Path("/proc/self/maps").read_text()
+        assert mapped(child)
+        assert mapped(os.getpid()) <= before
 
 
 def test_strings_and_many_arguments(tmp_path):
@@ -330,7 +308,13 @@ HANG = """
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in the background
     plant = FMU(sys.argv[1], isolated=True)
-    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+
+    def press():
+        while not os.path.exists(os.environ["CRASH_HANGS"]):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=press).start()
     try:
         simulate(System({"plant": plant}), step=0.0625, stop=1.0)
     except Interrupted as interrupted:
@@ -353,20 +337,24 @@ def test_ctrl_c_while_the_fmu_hangs(tmp_path, fault, said):
     """The signal goes to this process alone, as from a notebook; from a terminal the FMU's ignores it."""
     fmu = crash(tmp_path, fault)
     command = [sys.executable, "-c", textwrap.dedent(HANG), str(fmu.path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    env = os.environ | {"CRASH_HANGS": str(tmp_path / "hangs")}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=env)
     assert done.stdout.strip() == said, done.stderr
 
 
 def test_the_fmu_ends_with_the_process_that_runs_it(tmp_path):
     """Killed as by a lack of memory, while the FMU hangs and cannot be asked."""
     fmu = crash(tmp_path, "DoStep hang 0.5")
-    script = textwrap.dedent(HANG).replace("1.0, os.kill", "60.0, os.kill")
-    parent = subprocess.Popen([sys.executable, "-c", script, str(fmu.path)])
-    deadline = time.monotonic() + 30.0
-    while not (fmus := children(parent.pid)):
-        assert time.monotonic() < deadline, "the FMU's process has not come up"
+    mark = tmp_path / "hangs"
+    script = textwrap.dedent(HANG).replace("os.kill(", "(lambda *_: None)(")  # nobody presses Ctrl-C
+    env = os.environ | {"CRASH_HANGS": str(mark)}
+    parent = subprocess.Popen([sys.executable, "-c", script, str(fmu.path)], env=env)
+    deadline = time.monotonic() + 60.0  # a guard: a test that hangs would say nothing
+    while not mark.exists():
+        assert time.monotonic() < deadline, "the FMU has not come to its fault"
         time.sleep(0.05)
-    time.sleep(0.3)  # until it hangs
+    fmus = children(parent.pid)
+    assert len(fmus) == 1
     parent.kill()
     parent.wait()
     while any(Path(f"/proc/{pid}").exists() for pid in fmus):
