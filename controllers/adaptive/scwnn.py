@@ -1,7 +1,7 @@
-"""Adaptive sliding mode control by a self-constructing wavelet network (thesis.txt, chapter 3).
+"""Adaptive sliding mode control by a self-constructing wavelet network (the thesis' chapter 3).
 
 The structure, x'' = f(X) + g(X) u + d with X = [x, x'], is unknown; f and the diagonal of
-g are learnt while they are used.
+g are learnt while they are used. Numbers are those of the thesis' equations.
 
     e = x - x_d                                                              (3.3)
     s = e' + k1 e + k2 int e dt                                              (3.6)
@@ -18,24 +18,24 @@ g are learnt while they are used.
     u_a2 = r mu_sum,  r' = -eta_r s mu_sum                                   (3.53), (3.60)
     u = (-f + x_d'' - k1 e' - k2 e + u_a1 + u_a2) / g                        (3.8), (3.63)
 
-A node is added when the input is far from the nearest node and the error of the last
-five samples is large, (3.34) to (3.39); the weakest is dropped when it contributes less
-than E3 of the strongest (3.40). Memory is fixed: at most `n_nodes` nodes, and `full`
-counts how often a node was wanted beyond that.
+Here x_d = 0. A node is added when the input is far from the nearest node and the error of
+the last five samples is large, (3.34) to (3.39); the weakest is dropped when it contributes
+less than E3 of the strongest (3.40). Memory is fixed: there are at most `n_nodes` nodes,
+and `full` counts how often a node was wanted beyond that.
 
-What the print leaves open or has wrong, and what is done here:
+Where the print is open or wrong, this is done instead:
 - (3.51) has the signs of w_p and b_p against the sum that it is to cancel, (3.44); here
   the three terms are cancelled.
-- g starts from nothing, and (3.46) drives it below zero wherever s u < 0: u is divided by
+- g starts at zero, and (3.46) drives it below zero wherever s u < 0: u is divided by
   max(g, g_min). u is in units of u_max, so g is an acceleration.
 - (3.40) compares min phi with max phi. A Mexican hat is negative beyond zeta = 1: sizes
   |phi| are compared. The most central node is never dropped.
-- The width of the triangles of figure 3.3 is not printed: s_max, the peak of the
+- The width of the triangles of figure 3.3 is not printed: s_max is the peak of the
   outermost; beyond it they saturate.
-- r falls without end while s differs from zero, be it for measurement noise:
-  `leak` r is added to (3.60). With leak = 0 it is as printed.
+- r falls without end while s differs from zero, also from measurement noise: `leak` r is
+  added to (3.60). With leak = 0 it is as printed.
 
-X is sampled at t_k, u is held over [t_k, t_{k+1}]; u in (3.46) to (3.51) is the one held
+X is sampled at t_k and u is held over [t_k, t_{k+1}]; u in (3.46) to (3.51) is the one held
 over [t_{k-1}, t_k], after the actuators' limit.
 """
 
@@ -52,16 +52,16 @@ _MEXICAN_HAT = 2.0 / (sqrt(3.0) * pi**0.25)
 class SCWNN(Block):
     """Self-constructing wavelet network with fuzzy compensation, one actuator a displacement."""
 
-    k1 = Parameter(100.0, "sliding surface, displacement", unit="1/s", min=0.0)
-    k2 = Parameter(100.0, "sliding surface, integral", unit="1/s2", min=0.0)
-    e_max = Parameter(0.05, "largest distance that makes a node", min=0.0)
-    e_min = Parameter(0.001, "smallest distance that makes a node", min=0.0)
-    d_max = Parameter(0.05, "largest error that makes a node", min=0.0)
-    d_min = Parameter(0.005, "smallest error that makes a node", min=0.0)
-    beta = Parameter(0.97, "resolution of the distance", min=0.0, max=1.0)
-    gamma = Parameter(0.97, "resolution of the error", min=0.0, max=1.0)
+    k1 = Parameter(100.0, "weight of the displacement in s", unit="1/s", min=0.0)
+    k2 = Parameter(100.0, "weight of the integral in s", unit="1/s^2", min=0.0)
+    e_max = Parameter(0.05, "start of the threshold E1 on the distance", min=0.0)
+    e_min = Parameter(0.001, "end of the threshold E1", min=0.0)
+    d_max = Parameter(0.05, "start of the threshold E2 on the error", min=0.0)
+    d_min = Parameter(0.005, "end of the threshold E2", min=0.0)
+    beta = Parameter(0.97, "decay of E1 for each sample", min=0.0, max=1.0)
+    gamma = Parameter(0.97, "decay of E2 for each sample", min=0.0, max=1.0)
     E3 = Parameter(0.01, "pruning threshold", min=0.0)
-    rho = Parameter(0.8, "width of a new node", min=0.0)
+    rho = Parameter(0.8, "width of a new node over its distance from the nearest", min=0.0)
     eta_sigma = Parameter(0.001, "rate of the widths", min=0.0)
     eta_c = Parameter(0.001, "rate of the centres", min=0.0)
     eta_pw = Parameter(0.001, "weights w, proportional", min=0.0)
@@ -71,9 +71,9 @@ class SCWNN(Block):
     eta_pt = Parameter(0.001, "weights theta, proportional", min=0.0)
     eta_it = Parameter(0.01, "weights theta, integral", min=0.0)
     eta_r = Parameter(10.0, "rate of the fuzzy compensation", min=0.0)
-    leak = Parameter(0.0, "forgetting of the fuzzy compensation", unit="1/s", min=0.0)
-    s_max = Parameter(33.0, "where the outermost triangle peaks", min=1e-9)
-    g_min = Parameter(100.0, "smallest g that u is divided by", unit="m/s2", min=1e-9)
+    leak = Parameter(0.0, "rate at which the fuzzy compensation decays", unit="1/s", min=0.0)
+    s_max = Parameter(33.0, "peak of the outermost triangle", min=1e-9)
+    g_min = Parameter(100.0, "smallest g that u is divided by", unit="m/s^2", min=1e-9)
     u_max = Parameter(1e6, "unit and limit of the force", unit="N", min=1e-9)
 
     x = Input("displacements", unit="m", shape="p")
@@ -81,21 +81,22 @@ class SCWNN(Block):
     u = Output("forces", unit="N", shape="p")
     s = Output("sliding variables", shape="p")
     nodes = Output("number of nodes", unit="1")
-    full = Output("nodes that were wanted beyond the largest number", unit="1")
-    f = Output("estimate of f", unit="m/s2", shape="p")
+    full = Output("how often a node was wanted beyond n_nodes", unit="1")
+    f = Output("estimate of f", unit="m/s^2", shape="p")
     r = Output("fuzzy compensation", shape="p")
 
-    integral = Local(0.0, "of e", shape="p")
-    X = Local(shape="n")
-    c = Local(0.0, "centres", shape=("n_nodes", "n"))
-    sigma = Local(0.0, "widths", shape=("n_nodes", "n"))
-    w = Local(0.0, "integral part of w", shape=("n_nodes", "p"))
-    theta = Local(0.0, "integral part of theta", shape=("n_nodes", "p"))
-    b = Local(0.0, "integral part of b", shape=("p", "n"))
-    phi = Local(shape="n_nodes")
+    # sizes: p displacements with an actuator each, n = 2 p, n_nodes nodes at most
+    integral = Local(0.0, "int e dt", shape="p")
+    X = Local(0.0, "displacements, then velocities", shape="n")
+    c = Local(0.0, "centres of the nodes", shape=("n_nodes", "n"))
+    sigma = Local(0.0, "widths of the nodes", shape=("n_nodes", "n"))
+    w = Local(0.0, "w_i, integral part of w", shape=("n_nodes", "p"))
+    theta = Local(0.0, "theta_i, integral part of theta", shape=("n_nodes", "p"))
+    b = Local(0.0, "b_i, integral part of b", shape=("p", "n"))
+    phi = Local(0.0, "wavelets at X", shape="n_nodes")
     errors = Local(0.0, "|e|^2 of the last samples", shape=5)
-    h = Local(0.0, "number of nodes")
-    i = Local(0.0, "time index")
+    count = Local(0.0, "number of nodes")
+    sample = Local(0.0, "number of samples so far")
 
     def step(self, t: float, h: float) -> None:
         surface(self, h)
@@ -104,8 +105,8 @@ class SCWNN(Block):
         adapt_nodes(self, h)
         grow(self)
         prune(self)
-        self.nodes = self.h
-        self.i += 1.0
+        self.nodes = self.count
+        self.sample += 1.0
 
     @classmethod
     def design(cls, p: int, n_nodes: int = 40, **values: Any) -> SCWNN:
@@ -114,7 +115,7 @@ class SCWNN(Block):
 
 
 def surface(self: Any, T: float) -> None:
-    """X, int e and s at the sample."""
+    """Write X, int e and s at the sample."""
     p = self.x.shape[0]
     for j in range(p):
         self.X[j], self.X[p + j] = self.x[j], self.v[j]
@@ -122,7 +123,14 @@ def surface(self: Any, T: float) -> None:
         self.s[j] = self.v[j] + self.k1 * self.x[j] + self.k2 * self.integral[j]  # (3.6)
 
 
+def node_count(self: Any) -> int:
+    """Return the number of nodes; a restored state cannot make it exceed the arrays."""
+    most: int = self.phi.shape[0]
+    return min(max(int(self.count), 1), most)
+
+
 def distance2(self: Any, i: int) -> float:
+    """Return the squared distance of X from the centre of node i."""
     total = 0.0
     for m in range(self.X.shape[0]):
         gap = self.X[m] - self.c[i, m]
@@ -131,14 +139,14 @@ def distance2(self: Any, i: int) -> float:
 
 
 def hidden_layer(self: Any) -> None:
-    """The wavelets at X (3.14); the first two nodes are there from the first sample."""
+    """Write the wavelets at X (3.14); the first sample makes the first two nodes."""
     n = self.X.shape[0]
-    if self.i == 0.0:
-        self.h = 2.0
+    if self.sample == 0.0:
+        self.count = 2.0
         for m in range(n):
             self.c[1, m] = self.X[m]
             self.sigma[0, m] = self.sigma[1, m] = 1.0
-    for i in range(int(self.h)):
+    for i in range(node_count(self)):
         zeta2 = 0.0
         for m in range(n):
             zeta = (self.X[m] - self.c[i, m]) / self.sigma[i, m]
@@ -147,8 +155,8 @@ def hidden_layer(self: Any) -> None:
 
 
 def control(self: Any, T: float) -> None:
-    """Adapt the weights (3.45) to (3.47) and r (3.60); the force (3.8) with (3.63)."""
-    p, n, nodes = self.x.shape[0], self.X.shape[0], int(self.h)
+    """Adapt the weights (3.45) to (3.47) and r (3.60); write the force (3.8) with (3.63)."""
+    p, n, nodes = self.x.shape[0], self.X.shape[0], node_count(self)
     for j in range(p):
         s, u = self.s[j], self.u[j] / self.u_max
         phi2, f, g, u_a = 0.0, 0.0, 0.0, 0.0
@@ -177,7 +185,7 @@ def control(self: Any, T: float) -> None:
 
 
 def membership(s: float) -> float:
-    """mu_sum (3.53) of seven equal triangles over [-1, 1].
+    """Return mu_sum (3.53) of seven equal triangles over [-1, 1].
 
     Two neighbours overlap at any s and add up to one, so the weights -1, -2/3, ..., 1 at
     their peaks are interpolated: mu_sum = s between the outermost peaks.
@@ -186,12 +194,12 @@ def membership(s: float) -> float:
 
 
 def adapt_nodes(self: Any, T: float) -> None:
-    """Centres and widths, (3.48) and (3.49), with the force that is held from now on.
+    """Adapt centres and widths, (3.48) and (3.49), with the force that is held from now on.
 
     d phi/d zeta^2 = hat exp(-zeta^2/2) (zeta^2 - 3)/2, and zeta^2 = sum ((X - c)/sigma)^2.
     """
     p, n = self.x.shape[0], self.X.shape[0]
-    for i in range(int(self.h)):
+    for i in range(node_count(self)):
         pull = 0.0
         for j in range(p):
             s, u = self.s[j], self.u[j] / self.u_max
@@ -213,13 +221,13 @@ def adapt_nodes(self: Any, T: float) -> None:
 
 
 def grow(self: Any) -> None:
-    """(3.34) to (3.39)"""
-    p, n, nodes = self.x.shape[0], self.X.shape[0], int(self.h)
+    """Add a node at X if it is far from all others while the error is large, (3.34) to (3.39)."""
+    p, n, nodes = self.x.shape[0], self.X.shape[0], node_count(self)
     error2 = 0.0
     for j in range(p):
         error2 += self.x[j] * self.x[j]
     m = self.errors.shape[0]
-    self.errors[int(self.i) % m] = error2
+    self.errors[int(self.sample) % m] = error2
     total = 0.0
     for k in range(m):
         total += self.errors[k] / (m * m)
@@ -227,8 +235,8 @@ def grow(self: Any) -> None:
     for i in range(1, nodes):
         nearest = min(nearest, distance2(self, i))
     d = sqrt(nearest)
-    E1 = max(self.e_max * self.beta**self.i, self.e_min)
-    E2 = max(self.d_max * self.gamma**self.i, self.d_min)
+    E1 = max(self.e_max * self.beta**self.sample, self.e_min)
+    E2 = max(self.d_max * self.gamma**self.sample, self.d_min)
     if d <= E1 or sqrt(total) <= E2:
         return
     if nodes == self.c.shape[0]:
@@ -241,12 +249,12 @@ def grow(self: Any) -> None:
         self.w[nodes, j] = self.x[j] / self.eta_iw if self.eta_iw > 0.0 else 0.0
         self.theta[nodes, j] = 0.0
     self.phi[nodes] = _MEXICAN_HAT
-    self.h += 1.0
+    self.count += 1.0
 
 
 def prune(self: Any) -> None:
-    """(3.40): the last node takes the place of the dropped one."""
-    p, n, nodes = self.x.shape[0], self.X.shape[0], int(self.h)
+    """Drop the weakest node by (3.40); the last node takes its place."""
+    p, n, nodes = self.x.shape[0], self.X.shape[0], node_count(self)
     if nodes < 2:
         return
     weakest, strongest = 0, 0
@@ -265,4 +273,4 @@ def prune(self: Any) -> None:
     for j in range(p):
         self.w[weakest, j] = self.w[last, j]
         self.theta[weakest, j] = self.theta[last, j]
-    self.h -= 1.0
+    self.count -= 1.0

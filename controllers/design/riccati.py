@@ -1,9 +1,10 @@
 """Algebraic Riccati equations of regulators and observers, with errors that name the cause.
 
-    A' X + X A - (X B + N) R^-1 (B' X + N') + Q = 0,   gain = R^-1 (B' X + N')
+    A' X + X A - (X B + N) R^-1 (B' X + N') + Q = 0                         (1)
+    gain = R^-1 (B' X + N')                                                 (2)
 
-solved by SciPy (Schur method). The conditions are checked first, so that a failure
-says which mode or which actuator is to blame.
+SciPy solves (1) by Schur's method. The conditions for a solution are checked first, so that
+an error names the mode or the actuator that violates them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from cosim import Array, CosimError
 
 
 class DesignError(CosimError):
-    """A control design whose conditions do not hold."""
+    """The conditions of a control design do not hold."""
 
 
 def require_positive(R: Array, what: str, names: str = "actuator") -> None:
@@ -42,7 +43,7 @@ def require_stabilisable(A: Array, B: Array, what: str, remedy: str) -> None:
         if np.linalg.svd(pencil, compute_uv=False)[-1] < 1e-9 * scale:
             raise DesignError(
                 f"{what}: not stabilisable, mode {value.real:.4g}{value.imag:+.4g}j 1/s "
-                f"({abs(value) / (2 * np.pi):.4g} Hz) is not damped and not reached; {remedy}"
+                f"({abs(value) / (2 * np.pi):.4g} Hz) is neither damped nor reached; {remedy}"
             )
 
 
@@ -56,7 +57,7 @@ def regulator(
     names: str = "actuator",
     remedy: str = "move or add an actuator",
 ) -> tuple[Array, Array]:
-    """Stabilising solution X (n, n) and gain (m, n)."""
+    """Return the stabilising solution X (n, n) of (1) and the gain (m, n) of (2)."""
     require_positive(R, what, names)
     require_stabilisable(A, B, what, remedy)
     # Scaled to R = 1 and |B| = 1: SI forces and masses differ by twelve orders from states.

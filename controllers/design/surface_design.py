@@ -1,18 +1,18 @@
-"""Sliding surface by linear-quadratic design (thesis.txt, 2.3.1).
+"""Sliding surface by linear-quadratic design (the thesis' 2.3.1).
 
-The reduced system (2.9) is brought to the form of (2.10), (2.11) by x_2 = the states of
-the actuators and z_1 = x_1 - B_1 B_2^-1 x_2, so that the force enters x_2 only:
+The model (2.9) is brought to the form (2.10), (2.11): x_2 are the states of the actuators
+and z_1 = x_1 - B_1 B_2^-1 x_2, so that the force enters x_2 only.
 
-    z_1' = A_11 z_1 + A_12 x_2                                          (2.10)
-    x_2' = A_21 z_1 + A_22 x_2 + B_2 u                                  (2.11)
+    z_1' = A_11 z_1 + A_12 x_2                                              (2.10)
+    x_2' = A_21 z_1 + A_22 x_2 + B_2 u                                      (2.11)
 
-x_2 is treated as the control of (2.10) and J = int x' Q x dt is minimised:
+x_2 is the control of (2.10), for which J = int x' Q x dt is minimised:
 
-    x_2 = -P_1 z_1                                                      (2.12)
-    s = P_1 z_1 + x_2 = P x                                             (2.13)
+    x_2 = -P_1 z_1                                                          (2.12)
+    s = P_1 z_1 + x_2 = P x                                                 (2.13)
 
 The printed form assumes B_1 = 0, which a reduction by modes does not give; the
-transformation is that of Yang, Wu and Agrawal (1995).
+transformation follows Yang, Wu and Agrawal (1995).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .riccati import DesignError, regulator
 
 
 def optimal_surface(A: Array, B: Array, Q: Array) -> Array:
-    """P (m, n) of s = P x for x' = A x + B u and the weight Q (n, n)."""
+    """Return P (m, n) of s = P x for x' = A x + B u and the weight Q (n, n)."""
     n, m = B.shape
     # the m states that the actuators move most directly are x_2
     _, _, order = la.qr(B.T, pivoting=True)
@@ -37,7 +37,7 @@ def optimal_surface(A: Array, B: Array, Q: Array) -> Array:
     if values[-1] <= 1e-10 * values[0] or values[0] == 0.0:
         weakest = int(np.argmin(np.linalg.norm(B, axis=0)))
         raise DesignError(
-            f"optimal_surface: the forces act through fewer than {m} independent ways "
+            f"optimal_surface: the forces act in fewer than {m} independent ways "
             f"(det B_2 = 0, look at actuator {weakest + 1}); remove a redundant actuator"
         )
     D = np.eye(n)[np.concatenate([first, second])]

@@ -1,15 +1,16 @@
-"""Algorithm I: the gain falls with every switch (thesis 4.3).
+"""Algorithm I: the gain falls with every switch (the thesis' 4.3).
 
-    if sgn s(i) = sgn s(i-1):  M(i) = M(i-1),  else  M(i) = M(i-1) / rate
-    u = -M sgn(s)                                                 (4.4)
+    M_k = M_{k-1} / rate   if sgn s_k = -sgn s_{k-1}, otherwise M_{k-1}     (1)
+    u = -M sgn s                                                            (4.4)
 
-For systems without noise and disturbance. Chapter 4: rate = 1.1, M(0) = 100, the
-memory of sgn(s) starts at 0. What the thesis does not print: a switch is a strictly
-opposite sign (leaving the 0 of the start is none, and s = 0 keeps the memory), and M
-has a floor of 1; without it M falls to nothing within the 40 s of case 1.
+For systems without noise and disturbance. Chapter 4 has rate = 1.1 and M_0 = 100; the sign
+before the first call is 0. The thesis leaves two things open. Here a switch is a strictly
+opposite sign, so that leaving the 0 of the start is not one, and s = 0 keeps the last sign;
+and M has a floor of 1, without which it vanishes within the 40 s of case 1.
 
-i counts calls: under stage coupling every solver stage is one, which is what
-reproduces the printed norms (672 and 765 in cases 1 and 2).
+k counts calls. Under stage coupling every stage of the solver is a call, which reproduces
+the printed norms (672 and 765 in cases 1 and 2). s is that of t_k; u is held until the next
+call.
 """
 
 from cosim import Block, Input, Local, Output, Parameter, State
@@ -17,9 +18,9 @@ from cosim.functions import sign
 
 
 class AlgorithmI(Block):
-    """M is divided by `rate` at every change of sign of s, down to M_min; start it with M=..."""
+    """M is divided by `rate` at every change of sign of s, down to M_min; M=... sets its start."""
 
-    rate = Parameter(1.1, "factor of decrease at a switch", unit="1", min=1.0)
+    rate = Parameter(1.1, "divisor of the gain at a switch", unit="1", min=1.0)
     M_min = Parameter(1.0, "floor of the gain, not printed", unit="N", min=0.0)
     s = Input("sliding variable")
     u = Output("control force", unit="N")
@@ -30,7 +31,7 @@ class AlgorithmI(Block):
     def step(self, t: float, h: float) -> None:
         self.sgn = sign(self.s)
         if self.sgn * self.last < 0.0:
-            self.M = max(self.M / self.rate, self.M_min)
+            self.M = max(self.M / self.rate, self.M_min)  # (1)
         if self.sgn != 0.0:
             self.last = self.sgn
         self.u = -self.M * self.sgn  # (4.4)

@@ -1,8 +1,9 @@
-"""Sliding mode control with a constant gain (thesis 4.1, eq. 4.4).
+"""Sliding mode control with a constant gain (the thesis' 4.1).
 
-    u = -M sgn(s)                                                 (4.4)
+    u = -M sgn s                                                            (4.4)
 
-Chapter 4 takes M = 100 in cases 1 and 2, and M = 300 in cases 3 to 6.
+Chapter 4 has M = 100 in cases 1 and 2, and M = 300 in cases 3 to 6. s is that of t_k; u is
+held until the next call.
 """
 
 from cosim import Block, Input, Output, Parameter
@@ -10,7 +11,7 @@ from cosim.functions import sign
 
 
 class ConstantGain(Block):
-    """u = -M_0 sgn(s), (4.4); the output M is M_0, as with the other gain laws."""
+    """u = -M_0 sgn s; the output M is M_0, as the other gain laws have it."""
 
     M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
     s = Input("sliding variable")

@@ -1,10 +1,11 @@
-"""Sliding mode control of a state-space model with a gain law of its own (thesis.txt, 2.3.1 and 5.2).
+"""Sliding mode control of a state-space model with any gain law (the thesis' 2.3.1 and 5.2).
 
-    s = P x_hat                                                         (2.13)
-    u = (P B)^-1 (-P A x_hat + switching),  switching = -M sgn s         (2.15)
+    s = P x_hat                                                             (2.13)
+    u = (P B)^-1 (-P A x_hat + switching),  switching = -M sgn s            (2.15)
 
-(2.15) in two blocks, so that any gain law of chapter 4 (Algorithms I and II, the
-gain by equivalent control) gives `switching`: surface -> gain law -> force. One actuator.
+(2.15) in two blocks, with a gain law of chapter 4 between them that gives `switching`:
+StateSurface, then Algorithm I or II or another, then EquivalentForce. There is one
+actuator. x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}].
 """
 
 from __future__ import annotations
@@ -44,10 +45,10 @@ class EquivalentForce(Block):
 
 
 def design(model: StateSpace, Q: Array) -> tuple[StateSurface, EquivalentForce]:
-    """Surface and force for one actuator; Q (n, n) as for `SlidingMode.design`."""
+    """Make the surface and the force for one actuator; Q (n, n) as for `SlidingMode.design`."""
     if model.B.shape[1] != 1:
         raise DesignError(
-            f"equivalent_force: {model.B.shape[1]} actuators, "
+            f"equivalent_force: the model has {model.B.shape[1]} actuators, but "
             "the gain laws of chapter 4 take one; use SlidingMode"
         )
     P = optimal_surface(model.A, model.B, Q)

@@ -1,15 +1,15 @@
-"""Sliding surface of chapter 4 (thesis 4.1): s = x2 + a x1.
+"""Sliding surface in the phase plane of an oscillator (the thesis' 4.1).
 
-    s' = x2' + a x2                                               (4.3)
+    s = x_2 + a x_1,  s' = x_2' + a x_2                                     (4.3)
 
-On s = 0 the state decays: x1' = -a x1, so x1 = e^(-a t) x1(0).
+x_1 is the displacement, x_2 the velocity. On s = 0 the state decays: x_1 = e^(-a t) x_1(0).
 """
 
 from cosim import Block, Input, Output, Parameter
 
 
 class PhasePlaneSurface(Block):
-    """s = x2 + a x1, of displacement x1 and velocity x2 at the same instant."""
+    """s = x2 + a x1, with displacement x1 and velocity x2 at the same instant."""
 
     a = Parameter(1.0, "rate of decay on the surface", unit="1/s", min=0.0)
     x1 = Input("displacement", unit="m")
@@ -17,4 +17,4 @@ class PhasePlaneSurface(Block):
     s = Output("sliding variable", unit="m/s")
 
     def step(self, t: float, h: float) -> None:
-        self.s = self.x2 + self.a * self.x1
+        self.s = self.x2 + self.a * self.x1  # (4.3)

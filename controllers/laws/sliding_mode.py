@@ -1,11 +1,12 @@
-"""Sliding mode control by equivalent control (thesis.txt, 2.3.1).
+"""Sliding mode control by equivalent control (the thesis' 2.3.1).
 
-    s = P x_hat                                                         (2.13)
-    u = (P B)^-1 (-P A x_hat - M sgn s),  M = a |s| + delta              (2.15)
+    s = P x_hat                                                             (2.13)
+    s' = -a s - delta sgn s                                                 (2.14)
+    u = (P B)^-1 (-P A x_hat - M sgn s),  M = a |s| + delta                 (2.15)
 
-x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}]. With M growing with the
-distance, s' = -a s - delta sgn s in the model: the surface is approached at the rate a,
-and only delta chatters. sgn acts on each component of s, |s| is the norm.
+x_hat is the estimate at t_k, from measurements that carry the force held over
+[t_{k-1}, t_k]; u is held over [t_k, t_{k+1}]. In the model the surface is approached at the
+rate a, and only delta chatters. sgn acts on each component of s, |s| is the norm.
 """
 
 from __future__ import annotations

@@ -1,9 +1,13 @@
-"""State-dependent gain (thesis 4.2, after Lee and Utkin 2007).
+"""Gain that depends on the state (the thesis' 4.2).
 
-    M(x) = M_0 (|x| + delta),  u = -M sgn(s)                      (4.4)
+    M = M_0 (|x| + delta)                                                   (1)
+    u = -M sgn s                                                            (4.4)
 
-|x| is the Euclidean norm of the state (x1, x2); the thesis gives no numbers for M_0
-and delta. x mixes displacement and velocity, so M_0 carries no single unit.
+|x| is the Euclidean norm of the state (x_1, x_2). x mixes displacement and velocity, so M_0
+has no unit of its own. The thesis gives no numbers for M_0 and delta.
+
+Source: H. Lee and V. I. Utkin, Chattering suppression methods in sliding mode control
+systems, Annual Reviews in Control 31 (2007) 179-188, DOI 10.1016/j.arcontrol.2007.08.001.
 """
 
 from cosim import Block, Input, Output, Parameter
@@ -11,7 +15,7 @@ from cosim.functions import norm, sign
 
 
 class StateDependentGain(Block):
-    """M = M_0 (|x| + delta); connect x[1] .. x[n], n = 2 unless another is given."""
+    """M = M_0 (|x| + delta) with x[1] to x[n]; n is 2 unless it is given."""
 
     M_0 = Parameter(10.0, "gain on the norm of the state", min=0.0)
     delta = Parameter(0.1, "least norm", min=0.0)
@@ -26,5 +30,5 @@ class StateDependentGain(Block):
 
     def step(self, t: float, h: float) -> None:
         self.sgn = sign(self.s)
-        self.M = self.M_0 * (norm(self.x) + self.delta)
+        self.M = self.M_0 * (norm(self.x) + self.delta)  # (1)
         self.u = -self.M * self.sgn  # (4.4)

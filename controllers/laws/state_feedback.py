@@ -1,10 +1,10 @@
-"""Linear state feedback, and its optimal gain: with an observer, LQG control.
+"""Linear state feedback with the optimal gain (LQR); with an observer this is LQG control.
 
-    u = -K x_hat,  K = R^-1 (B' X + N')
-    X minimises int (x' Q x + 2 x' N u + u' R u) dt
+    u = -K x_hat,  K = R^-1 (B' X + N')                                     (1)
 
-x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}]. `weight_outputs` turns weights on
-outputs z = C x + D u into Q, N, R.
+X solves the Riccati equation (riccati.py), so that int (x' Q x + 2 x' N u + u' R u) dt is
+least. x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}]. `weight_outputs` turns
+weights on outputs z = C x + D u into Q, N and a part of R.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class StateFeedback(Block):
     u = Output("control force", shape="m", unit="N")
 
     def step(self, t: float, h: float) -> None:
-        matvec(self.minus_K, self.x_hat, self.u)
+        matvec(self.minus_K, self.x_hat, self.u)  # (1)
 
     @classmethod
     def lqr(
@@ -36,5 +36,5 @@ class StateFeedback(Block):
 
 
 def weight_outputs(C: Array, D: Array, weight: Array) -> tuple[Array, Array, Array]:
-    """Q, N and the addition to R from z' weight z with z = C x + D u."""
+    """Return Q, N and the addition to R for z' weight z with z = C x + D u."""
     return C.T @ weight @ C, C.T @ weight @ D, D.T @ weight @ D

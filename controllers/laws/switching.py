@@ -1,12 +1,17 @@
-"""Switching functions in place of sgn(s) (thesis 4.2, item 3): saturation and hysteresis.
+"""Switching functions in place of sgn s (the thesis' 4.2, third method): saturation and hysteresis.
 
-    sat(s) = s  for |s| < gamma,  sgn(s)  for |s| >= gamma        (as printed)
+    sat s = s for |s| < gamma, otherwise sgn s                              (1)
+    sat s = s/gamma for |s| < gamma, otherwise sgn s                        (2)
+    hys s = sgn s for |s| > width, otherwise as in the last call            (3)
+    u = -M_0 sat s  or  -M_0 hys s
 
-The printed form mixes a sliding variable with a pure number: it has a unit only when
-s is without one, and it jumps from gamma to 1 at |s| = gamma. Slotine and Sastry's own
-boundary layer, s / gamma inside, is continuous and has no unit; `scaled` chooses it.
+The thesis prints (1). It jumps from gamma to 1 at |s| = gamma, and it has a unit only when s
+has none. (2) is the boundary layer of the source, continuous and without unit; the
+parameter `scaled` chooses it. (3) starts at sgn s.
 
-    hys(s) = sgn(s) for |s| > width, otherwise as before          (starts at sgn(s))
+Source: J.-J. Slotine and S. S. Sastry, Tracking control of non-linear systems using sliding
+surfaces, with application to robot manipulators, International Journal of Control 38 (1983)
+465-492, DOI 10.1080/00207178308933088.
 """
 
 from cosim import Block, Input, Local, Output, Parameter
@@ -14,26 +19,26 @@ from cosim.functions import sign
 
 
 def saturation(s: float, gamma: float) -> float:
-    """Return s for |s| < gamma, otherwise its sign: as the thesis prints it."""
+    """Return sat s of (1)."""
     return s if abs(s) < gamma else sign(s)
 
 
 def boundary_layer(s: float, gamma: float) -> float:
-    """Return s / gamma for |s| < gamma, otherwise its sign: continuous."""
+    """Return sat s of (2)."""
     return s / gamma if abs(s) < gamma else sign(s)
 
 
 def hysteresis(s: float, width: float, before: float) -> float:
-    """Return the sign of s outside [-width, width], inside it what was before (0: the sign)."""
+    """Return hys s of (3); `before` is its last value, 0 at the start."""
     return sign(s) if abs(s) > width or before == 0.0 else before
 
 
 class SaturationControl(Block):
-    """u = -M_0 sat(s), with the printed sat or, scaled=1, the continuous one."""
+    """u = -M_0 sat s, by (1) or, with scaled=1, by (2)."""
 
     M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
     gamma = Parameter(0.1, "half width of the boundary layer", min=0.0)
-    scaled = Parameter(0.0, "1: s / gamma in the layer, 0: s, as printed", min=0.0, max=1.0)
+    scaled = Parameter(0.0, "0: (1), as printed; 1: (2), continuous", min=0.0, max=1.0)
     s = Input("sliding variable")
     u = Output("control force", unit="N")
     M = Output("gain", unit="N")
@@ -49,7 +54,7 @@ class SaturationControl(Block):
 
 
 class HysteresisControl(Block):
-    """u = -M_0 hys(s): a switch only when s has left [-width, width] on the other side."""
+    """u = -M_0 hys s: it switches only when s has left [-width, width] on the other side."""
 
     M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
     width = Parameter(0.1, "half width of the loop", min=0.0)
@@ -57,7 +62,7 @@ class HysteresisControl(Block):
     u = Output("control force", unit="N")
     M = Output("gain", unit="N")
     sgn = Output("sign of s", unit="1")
-    before = Local(0.0, "switching function at the call before")
+    before = Local(0.0, "switching function in the last call")
 
     def step(self, t: float, h: float) -> None:
         self.sgn = sign(self.s)

@@ -1,7 +1,9 @@
-"""Viscous dampers, as a controller without a controller: u = -c v.
+"""Viscous dampers in the place of a controller.
 
-v is the velocity across each damper; the force is limited like an actuator's. What they
-do between samples is held, so the step must be short against what they damp.
+    u_j = -c v_j,  |u_j| <= limit                                           (1)
+
+v_j is the velocity across damper j at t_k; the force is limited like that of an actuator
+and held over [t_k, t_{k+1}], so the step must be short against the vibration.
 """
 
 from __future__ import annotations
@@ -11,13 +13,13 @@ from cosim.functions import clip
 
 
 class ViscousDampers(Block):
-    """u_j = -c v_j, limited to +-limit."""
+    """u_j = -c v_j within +-limit"""
 
-    c = Parameter(1e6, "damping of each", unit="N*s/m", min=0.0)
+    c = Parameter(1e6, "damping constant of each damper", unit="N*s/m", min=0.0)
     limit = Parameter(1e6, "largest force", unit="N", min=0.0)
     v = Input("velocity across the dampers", unit="m/s", shape="p")
     u = Output("force", unit="N", shape="p")
 
     def step(self, t: float, h: float) -> None:
         for j in range(self.v.shape[0]):
-            self.u[j] = clip(-self.c * self.v[j], -self.limit, self.limit)
+            self.u[j] = clip(-self.c * self.v[j], -self.limit, self.limit)  # (1)

@@ -1,13 +1,21 @@
 """Displacements and velocities at many places of rigid parts from few displacement sensors.
 
-Knows where the sensors are, and nothing of the structure: an alpha-beta filter for each,
+The observer knows where the sensors are, and nothing about the structure. An alpha-beta
+filter for each sensor estimates its displacement x and velocity v,
 
-    e_k = y_k - (x_{k-1} + h v_{k-1})
-    x_k = x_{k-1} + h v_{k-1} + alpha e_k,   v_k = v_{k-1} + beta/h e_k
+    e_k = y_k - (x_{k-1} + h v_{k-1})                                       (1)
+    x_k = x_{k-1} + h v_{k-1} + alpha e_k,   v_k = v_{k-1} + beta/h e_k     (2)
 
-and T carries the motion of the sensors to that of the places, x_out = T x, v_out = T v. With
-beta = alpha^2 / (2 - alpha) the filter is the steady Kalman filter of a white acceleration
-(Benedict and Bordner, 1962).
+and T carries the motion of the sensors to that of the places,
+
+    x_out = T x,  v_out = T v                                               (3)
+
+With beta = alpha^2/(2 - alpha) the filter is the steady Kalman filter for a white
+acceleration. y_k is sampled at t_k, and the outputs are estimates at t_k.
+
+Source: T. R. Benedict and G. W. Bordner, Synthesis of an optimal set of radar
+track-while-scan smoothing equations, IRE Transactions on Automatic Control 7 (1962) 27-32,
+DOI 10.1109/TAC.1962.1105477.
 """
 
 from __future__ import annotations
@@ -19,31 +27,32 @@ from cosim.functions import matvec
 
 
 class KinematicObserver(Block):
-    """Alpha-beta filters on r sensors, and p places moved by them."""
+    """Alpha-beta filters on r sensors, and the motion of p places."""
 
-    T = Parameter(0.0, "motion of the places of unit motion of a sensor", shape=("p", "r"), fixed=True)
-    alpha = Parameter(0.5, "share of a surprise that is displacement", unit="1", min=0.0, max=1.0)
-    beta = Parameter(1.0 / 6.0, "share of a surprise that is velocity", unit="1", min=0.0, max=2.0)
+    T = Parameter(0.0, "motion of the places for a unit motion of each sensor", shape=("p", "r"), fixed=True)
+    alpha = Parameter(0.5, "gain on the displacement", unit="1", min=0.0, max=1.0)
+    beta = Parameter(1.0 / 6.0, "gain on the velocity", unit="1", min=0.0, max=2.0)
     y = Input("measured displacements", unit="m", shape="r")
     x = Output("displacements of the places", unit="m", shape="p")
     v = Output("velocities of the places", unit="m/s", shape="p")
     place = Local(0.0, "filtered displacements of the sensors", shape="r")
-    speed = Local(0.0, "their velocities", shape="r")
+    speed = Local(0.0, "filtered velocities of the sensors", shape="r")
 
     def step(self, t: float, h: float) -> None:
         for i in range(self.y.shape[0]):
             predicted = self.place[i] + h * self.speed[i]
-            surprise = self.y[i] - predicted
-            self.place[i] = predicted + self.alpha * surprise
-            self.speed[i] += self.beta / h * surprise
-        matvec(self.T, self.place, self.x)
+            error = self.y[i] - predicted  # (1)
+            self.place[i] = predicted + self.alpha * error
+            self.speed[i] += self.beta / h * error  # (2)
+        matvec(self.T, self.place, self.x)  # (3)
         matvec(self.T, self.speed, self.v)
 
     @classmethod
     def design(cls, places: Array, sensors: Array, alpha: float = 0.5) -> KinematicObserver:
-        """From rows over the structure's degrees of freedom: places (p, n) and sensors (r, n).
+        """Make the observer from rows over the structure's degrees of freedom.
 
-        The places must move as a combination of the sensors does; otherwise a ValueError.
+        places (p, n) and sensors (r, n). Raises ValueError when the motion of the places is not
+        a combination of that of the sensors.
         """
         T = places @ np.linalg.pinv(sensors)
         missed = np.abs(T @ sensors - places).max()

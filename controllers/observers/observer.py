@@ -1,21 +1,20 @@
-"""Observer of a reduced model from noisy measurements (thesis.txt, 2.2.2).
+"""Observer of a reduced model from noisy measurements (the thesis' 2.2.2).
 
-    x_hat' = A x_hat + B u + L (y - C x_hat - D u)                      (2.5)
-    L = (P_0 C' + S_0) R_0^-1                                           (2.6)
-    Q_0 = E S_ww E',  S_0 = E S_ww F',  R_0 = S_vv + F S_ww F'          (2.7)
+    x_hat' = A x_hat + B u + L (y - C x_hat - D u)                          (2.5)
+    L = (P_0 C' + S_0) R_0^-1                                               (2.6)
+    Q_0 = E S_ww E',  S_0 = E S_ww F',  R_0 = S_vv + F S_ww F'              (2.7)
+    e' = (A - L C) e + E w - L (F w + v)                                    (2.8)
 
-P_0 solves the filter Riccati equation with the cross term S_0, which is there because
-the wind that moves the structure is in the measured accelerations too. The error obeys
-e' = (A - L C) e + E w - L (F w + v) (2.8).
+P_0 solves the Riccati equation of the filter with the cross term S_0: the disturbance that
+moves the structure is in the measured accelerations too.
 
-Which sample: y_k is measured at t_k and carries the force held over [t_{k-1}, t_k], so
-the block takes that force, `u_last`, and closes the step that ends at t_k:
+Which sample: y_k is measured at t_k and carries the force held over [t_{k-1}, t_k]. The
+block takes that force as `u_last` and closes the step that ends at t_k,
 
-    x_hat_k = A_d x_hat_{k-1} + B_d u_{k-1} + L_d y_k
+    x_hat_k = A_d x_hat_{k-1} + B_d u_{k-1} + L_d y_k                       (1)
 
-the exact solution of (2.5) for u and y constant over the step. Given the force of the
-next step instead, the feedthrough D u does not cancel and the observer is wrong from
-the first step on.
+which is the exact solution of (2.5) for u and y constant over the step. With the force of
+the next step instead, D u does not cancel and the estimate is wrong from the first step on.
 """
 
 from __future__ import annotations
@@ -31,19 +30,19 @@ from ..design.state_space import StateSpace
 
 
 def observer_gain(model: StateSpace, S_ww: Array, S_vv: Array) -> Array:
-    """L (n, r) of (2.6); S_ww (p, p) and S_vv (r, r) are the spectral densities of w and v."""
+    """Return L (n, r) of (2.6); S_ww (p, p) and S_vv (r, r) are the spectral densities of w and v."""
     Q_0 = model.E @ S_ww @ model.E.T
     S_0 = model.E @ S_ww @ model.F.T
     R_0 = S_vv + model.F @ S_ww @ model.F.T
     _, gain = regulator(
         model.A.T, model.C.T, Q_0, 0.5 * (R_0 + R_0.T), S_0,
-        what="observer", names="sensor", remedy="it is not observed; move or add a sensor",
+        what="observer", names="sensor", remedy="no sensor sees it: move or add a sensor",
     )  # fmt: skip
     return np.asarray(gain.T)
 
 
 class Observer(Block):
-    """Estimated states from measurements and the force that they carry (2.5)."""
+    """Estimated states from measurements and the force that they carry, (2.5) and (1)"""
 
     A_d = Parameter(shape=("n", "n"), meaning="transition of the estimate over one step")
     B_d = Parameter(shape=("n", "m"), meaning="effect of the held force")
@@ -56,7 +55,7 @@ class Observer(Block):
     def step(self, t: float, h: float) -> None:
         matvec(self.A_d, self.x_hat, self.x_next)
         matvec_add(self.B_d, self.u_last, self.x_next)
-        matvec_add(self.L_d, self.y, self.x_next)
+        matvec_add(self.L_d, self.y, self.x_next)  # (1)
         assign(self.x_next, self.x_hat)
 
     @classmethod

@@ -23,7 +23,7 @@ def test_first_step_is_the_equations_of_the_thesis():
     rng = np.random.default_rng(4)
     p, T = 3, 0.005
     net = SCWNN.design(p, 6, g_min=2.0, s_max=5.0, u_max=40.0, eta_sigma=0.0, eta_c=0.0, leak=0.3)
-    net.h, net.i = 4.0, 7.0  # four nodes, not the first sample
+    net.count, net.sample = 4.0, 7.0  # four nodes, not the first sample
     for name in ("c", "w", "theta", "b", "r", "integral"):
         view = getattr(net, name)
         view[...] = rng.standard_normal(view.shape)
@@ -58,7 +58,7 @@ def test_centres_and_widths_follow_the_gradient_of_the_wavelets():
     rng = np.random.default_rng(5)
     p, T, eta = 2, 0.01, 0.7
     net = SCWNN.design(p, 3, eta_sigma=eta, eta_c=eta, eta_pw=0.0, eta_pt=0.0, u_max=1.0)
-    net.h, net.i = 3.0, 5.0
+    net.count, net.sample = 3.0, 5.0
     for name in ("c", "w", "theta"):
         getattr(net, name)[...] = rng.standard_normal(getattr(net, name).shape)
     net.sigma[...] = rng.uniform(1.0, 2.0, net.sigma.shape)

@@ -231,7 +231,7 @@ def test_output_weights(rng: np.random.Generator) -> None:
 
 def test_failing_conditions_name_the_culprit() -> None:
     A = np.diag([0.5, -1.0])
-    with pytest.raises(DesignError, match=r"not stabilisable, mode 0\.5.*not reached"):
+    with pytest.raises(DesignError, match=r"not stabilisable, mode 0\.5.*neither damped nor reached"):
         regulator(A, np.array([[0.0], [1.0]]), np.eye(2), np.eye(1))
     with pytest.raises(DesignError, match=r"R is not positive definite .*actuator 2"):
         regulator(A, np.eye(2), np.eye(2), np.diag([1.0, -0.1]))
