@@ -19,19 +19,21 @@ import scipy.linalg as la
 from fmpy.fmi2 import FMU2Slave
 
 from controllers.design.condensation import first_order
+from controllers.laws.sliding_mode import SlidingMode
 from cosim import FMU, simulate
-from scenarios.tall_building import study as tall_building
+from scenarios.tall_building import plant as tower
 from scenarios.tall_building.building import with_damper
+from scenarios.tall_building.control import PERIOD as H
 from scenarios.tall_building.control import SURFACE_WEIGHTS, tower_observer
 from scenarios.tall_building.criteria import FLOORS
+from scenarios.tall_building.study import Study
 
-H = tall_building.PERIOD
 WATCHED = ["tower.x", "tower.a", "tower.x_m", "tower.u", "power.p"]
 
 
 def ours(span: float = 120.0) -> float:
     """Best of three, us a step."""
-    system = tall_building.build()
+    system = Study().build()
     simulate(system, step=H, stop=10 * H, record=[], statistics=WATCHED)  # compiles
     runs = [simulate(system, step=H, stop=span, record=[], statistics=WATCHED) for _ in range(3)]
     return min(r.seconds / r.steps for r in runs) * 1e6
@@ -39,7 +41,7 @@ def ours(span: float = 120.0) -> float:
 
 def by_hand(steps: int = 3000) -> float:
     """The same with FMPy's calls and NumPy, us a step."""
-    plant = tall_building.build().participants["tower"]
+    plant = Study().build().participants["tower"]
     assert isinstance(plant, FMU)
     description = fmpy.read_model_description(plant.path)
     references = {v.name: v.valueReference for v in description.modelVariables}
@@ -57,12 +59,12 @@ def by_hand(steps: int = 3000) -> float:
     fmu.enterInitializationMode()
     fmu.exitInitializationMode()
 
-    model = tall_building.model_of(None)
+    model = tower.model_of(None)
     observer = tower_observer(model)
-    law = tall_building.SlidingMode.design(model, SURFACE_WEIGHTS.matrix(model))
+    law = SlidingMode.design(model, SURFACE_WEIGHTS.matrix(model))
     A_d, B_d, L_d = observer.A_d.copy(), observer.B_d[:, 0].copy(), observer.L_d.copy()
     P, PA, PB_inv = law.P[0].copy(), law.PA[0].copy(), float(law.PB_inv[0, 0])
-    table, dt = tall_building.load(None, tall_building.SEED, tall_building.DURATION, 76)
+    table, dt = tower.load(None, tower.SEED, tower.DURATION, 76)
     rng = np.random.default_rng(1)
     approach = -np.expm1(-H / 0.1)
     x_hat, u, u_f = np.zeros(12), 0.0, 0.0
@@ -92,7 +94,7 @@ def by_hand(steps: int = 3000) -> float:
 
 def dense(steps: int = 5000) -> float:
     """The plant alone, dense, us a step."""
-    coupled = with_damper(tall_building.building())
+    coupled = with_damper(tower.building())
     A, n = first_order(coupled.M, coupled.C, coupled.K), coupled.dof
     B = np.vstack([np.zeros((n, n)), la.inv(coupled.M)])
     E = la.expm(np.block([[A * H, B * H], [np.zeros((n, 3 * n))]]))
@@ -122,8 +124,8 @@ def test_memory_of_a_default_run() -> None:
     """
     # VmHWM and not ru_maxrss, which starts from the size of the process that started this one
     code = (
-        "import sys; from scenarios.tall_building import study;"
-        "study.run(duration=float(sys.argv[1]));"
+        "import sys; from scenarios.tall_building.study import Study;"
+        "Study(duration=float(sys.argv[1])).run();"
         "status = open('/proc/self/status').read(); print(status.split('VmHWM:')[1].split()[0])"
     )
     root = Path(__file__).parents[2]

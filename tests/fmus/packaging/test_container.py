@@ -18,7 +18,7 @@ from cosim.system.system import is_block
 from fmus.export import ExportError, export
 from fmus.packaging.container import export_container
 from fmus.plants.oscillator import Oscillator
-from scenarios.chattering import study as chattering
+from scenarios.chattering.study import Study
 from tests.fmus.packaging.ssp_parts import Damper, Frame, Watch
 from tests.fmus.packaging.test_ssp_elsewhere import Brake, at_rest, frame
 
@@ -61,7 +61,7 @@ def late() -> System:
 
 
 def case_6() -> System:
-    return chattering.build(case=6)
+    return Study(case=6).build()
 
 
 @pytest.mark.parametrize(
