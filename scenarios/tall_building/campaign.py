@@ -23,12 +23,12 @@ def run_all(studies: Sequence[Study], workers: int = 0) -> list[dict[str, float]
     Runs are processes, not threads: FMPy changes the working directory, which all threads
     share, while it loads a library.
     """
-    # studies with the same features share their compiled kernels: compile before the processes start
-    for study in {(s.controller, *map(bool, astuple(s))): s for s in studies}.values():
-        replace(study, duration=10 * PERIOD).run()
     count = workers or os.cpu_count() or 1
     if count == 1:
         return [_criteria(study) for study in studies]
+    # studies with the same features share their compiled kernels: compile before the processes start
+    for study in {(s.controller, *map(bool, astuple(s))): s for s in studies}.values():
+        replace(study, duration=10 * PERIOD).run()
     with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
         return list(pool.map(_criteria, studies))
 

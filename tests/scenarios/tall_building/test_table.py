@@ -80,12 +80,14 @@ def test_a_worse_filtered_control_is_told() -> None:
 
 def test_rows_and_text_of_the_thesis_tables() -> None:
     """Two seconds of every column; the text has every criterion, and names what was fitted."""
-    rows = thesis_rows(Study(duration=2.0, record=False), workers=1)
+    rows = thesis_rows(Study(duration=2.0, record=False, plant="python"), workers=1)
     assert len(rows) == 6 * 3 * 16
     assert all(math.isfinite(row["computed"]) for row in rows)
     own = {(r["controller"], r["a"], r["stiffness_error"]): r for r in rows if r["criterion"] == "J9"}
-    alone = Study(controller="lqg", stiffness_error=0.15, duration=2.0, record=False).run().criteria()
-    assert own["lqg", None, 0.15]["computed"] == alone["J9"]
+    alone = Study(
+        controller="lqg", stiffness_error=0.15, duration=2.0, record=False
+    )  # as an FMU: the same bits
+    assert own["lqg", None, 0.15]["computed"] == alone.run().criteria()["J9"]
     text = Table().text(rows)
     assert "filtered-smc, a = 1.065" in text
     assert sum(line.startswith("max_xm (cm)") for line in text.splitlines()) == 2
@@ -96,7 +98,7 @@ def test_rows_and_text_of_the_thesis_tables() -> None:
 
 @pytest.mark.parametrize("study", ["realism", "beyond"])
 def test_rows_and_text_of_the_variants(study: str) -> None:
-    table = Table(study=study, duration=1.0, workers=1)  # type: ignore[arg-type]
+    table = Table(study=study, duration=1.0, workers=1, plant="python")  # type: ignore[arg-type]
     rows = table.rows()
     assert len(rows) == 10 * 16
     text = table.text(rows)
@@ -119,12 +121,21 @@ def test_broken_limits_and_unstable_cases_are_told() -> None:
     assert lines[4] == "Of 3 cases, 1 are unstable (lost), and 1 break a hardware limit (wild)."
 
 
-def test_table_of_the_coupling() -> None:
-    table = Table(study="coupling", duration=2.0)
-    rows = table.rows()
-    assert len(rows) == 10
-    lines = table.text(rows).splitlines()
-    assert [line.split()[:2] for line in lines[1:3]] == [["20", "sampled"], ["20", "iterated"]]
+def test_table_of_the_coupling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rows are those of coupling.py, whose numbers test_study.py checks; one line for each."""
+    rows = [
+        {"step": 0.02, "coupling": "sampled", "x76": 1.6e-3, "x_m": 2e-3, "order": None},
+        {"step": 0.01, "coupling": "sampled", "x76": 0.8e-3, "x_m": 1e-3, "order": 1.0},
+    ]
+    asked = []
+    monkeypatch.setattr("scenarios.tall_building.table.coupling_errors", lambda *a: asked.append(a) or rows)
+    table = Table(study="coupling", seed=3, duration=2.0)
+    lines = table.text(table.rows()).splitlines()
+    assert asked == [(None, None, 3, 2.0)]
+    assert [line.split() for line in lines[1:3]] == [
+        ["20", "sampled", "1.600e-03", "2.000e-03"],
+        ["10", "sampled", "8.000e-04", "1.000e-03", "1.00"],
+    ]
 
 
 def test_a_run_that_diverges_has_no_criteria() -> None:
