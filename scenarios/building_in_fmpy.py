@@ -1,9 +1,9 @@
-"""A building of ours in somebody else's Python loop, which needs FMPy and the FMU, and nothing of ours.
+"""An exported building, run with FMPy alone: the loop needs FMPy and the FMU, but not this project.
 
     cosim export building_in_fmpy:building --out building.fmu
     python building_in_fmpy.py building.fmu
 
-`shake` is that loop. `cosim run building_in_fmpy` is the same in ours, with the same numbers.
+`shake` is that loop. `cosim run building_in_fmpy` runs the same system here, with the same numbers.
 """
 
 import math
@@ -18,12 +18,12 @@ H, STEPS, DAMPING = 0.01, 1000, 40.0
 
 
 def ground(t: float) -> float:
-    """Acceleration of the ground, m/s2: three seconds of shaking."""
+    """Return the acceleration of the ground, m/s^2: three seconds of shaking."""
     return 2.0 * math.sin(9.0 * t) if t < 3.0 else 0.0
 
 
 def shake(path: str) -> list[float]:
-    """Roof displacement at 0, H, 2 H, ..., m; a damper holds the roof to a fixed point."""
+    """Return the roof displacement at 0, H, 2 H, ..., m; a damper ties the roof to a fixed point."""
     description = read_model_description(path)
     reference = {v.name: v.valueReference for v in description.modelVariables}
     unpacked = extract(path)
@@ -44,7 +44,7 @@ def shake(path: str) -> list[float]:
 
 
 def build() -> Any:
-    """Return the same as a system of ours; `building` in it is what `cosim export` takes."""
+    """Return the same system; its participant `building` is the one to export."""
     from controllers.laws.viscous_dampers import ViscousDampers
     from cosim import System
     from cosim.blocks import function_source
@@ -57,7 +57,7 @@ def build() -> Any:
 
 
 def run() -> Any:
-    """Run building and damper in our loop."""
+    """Run building and damper."""
     from cosim import simulate
 
     return simulate(build(), step=H, stop=STEPS * H)

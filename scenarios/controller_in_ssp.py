@@ -1,11 +1,11 @@
-"""A controller of yours in other tools: plant, load and controller as FMUs, wired in one SSP file.
+"""Your controller in other tools: plant, load and controller as FMUs, wired in one SSP file.
 
     cosim run controller_in_ssp --ssp loop.ssp        write the file, read it back, run it
-    cosim table controller_in_ssp                     our loop beside that of ecos
+    cosim table controller_in_ssp                     this project's loop beside that of ecos
     cosim run loop.ssp --replace control=mine.py:Mine
 
-A tool like ecos exchanges all values and then steps all FMUs, so that each block on the way adds
-one step of delay. `late` builds the same here: what leaves a block arrives one step later.
+A tool such as ecos exchanges all values and then steps all FMUs, so that each block on the way adds
+one step of delay. `late` builds the same loop here: the outputs of blocks arrive one step later.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ class RoofDamper(Block):
     c = Parameter(0.06, "damping", unit="kN*s/m", min=0.0)
     v_0 = Parameter(0.2, "velocity of half the damping", unit="m/s", min=1e-6)
     v = Input("velocity", unit="m/s")
-    F = Output("force", unit="kN")  # the building's is in N: the file has the factor for tools without units
+    F = Output("force", unit="kN")  # the building takes N: the file states the factor for tools without units
 
     def step(self, t: float, h: float) -> None:
         self.F = -self.c * self.v / (1.0 + abs(self.v) / self.v_0)
 
 
 def build(*, late: bool = False) -> System:
-    """Return the system, or the one that a master without an order of blocks makes of it."""
+    """Return the system; late: with the delays of a master that does not order its blocks."""
     building = ShearBuilding.build([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
     ground = function_source(lambda t: 2.0 * math.sin(9.0 * t) * math.exp(-0.5 * t), unit="m/s^2")
     system = System({"building": building, "ground": ground, "control": RoofDamper()})
@@ -50,12 +50,12 @@ def build(*, late: bool = False) -> System:
 
 
 def run(*, ssp: Path = Path("out/controller_in_ssp/loop.ssp"), late: bool = False) -> Result:
-    """Write the SSP and run what is in it; late: with the delays of other tools, ssp: the file."""
+    """Write the SSP and run it; late: with the delays of other tools, ssp: the file."""
     return simulate(read_ssp(export_ssp(build(late=late), ssp, step=STEP, stop=STOP)), step=STEP, stop=STOP)
 
 
 def ecos(ssp: Path) -> list[float]:
-    """Return the displacement of the roof at all points, computed by ecos."""
+    """Return the roof displacement at all communication points, computed by ecos."""
     with ecospy().EcosSimulation(step_size=STEP, ssp_path=str(ssp)) as simulation:
         simulation.init(parameter_set=PARAMETER_SET)
         roof = [simulation.get_real("building::x[3]")]
@@ -66,7 +66,7 @@ def ecos(ssp: Path) -> list[float]:
 
 
 def table(*, ssp: Path = Path("out/controller_in_ssp/loop.ssp")) -> list[dict[str, Any]]:
-    """Run the file here, with and without the delays of other tools, and in ecos if that is installed."""
+    """Run the file here, with and without the delays of other tools, and in ecos if it is installed."""
     runs = {
         name: run(ssp=ssp, late=late)["building.x"][:, 2] for name, late in (("late", True), ("ours", False))
     }

@@ -19,9 +19,10 @@ import numpy as np
 from cosim import FMU, Result, System, read_ssp, simulate
 from fmus.export import export
 from fmus.packaging.ssp import export_ssp
-from scenarios.chattering import study as chattering
-from scenarios.highway_bridge import study as highway_bridge
-from scenarios.tall_building import study as tall_building
+from scenarios.chattering.study import GAINS
+from scenarios.chattering.study import Study as Chattering
+from scenarios.highway_bridge.study import Study as HighwayBridge
+from scenarios.tall_building.study import Study as TallBuilding
 from tests.fmus.export.every_class import H, classes, makers
 
 STEPS = 200
@@ -37,31 +38,31 @@ def digest(result: Result) -> str:
 
 def chattering_cases() -> Iterator[tuple[str, str]]:
     """Every case, gain law and coupling of chapter 4."""
-    for case, gain, coupling in product(range(1, 7), chattering.GAINS, ("sampled", "continuous")):
+    for case, gain, coupling in product(range(1, 7), GAINS, ("sampled", "continuous")):
         yield (
             f"case {case}, {gain}, {coupling}",
-            digest(chattering.run(case=case, gain=gain, coupling=coupling)),
+            digest(Chattering(case=case, gain=gain, coupling=coupling).run()),
         )
 
 
 def tower() -> Iterator[tuple[str, str]]:
     """60 s of the tall building."""
     for controller in ("filtered-smc", "lqg"):
-        yield controller, digest(tall_building.run(controller=controller, duration=60.0))
+        yield controller, digest(TallBuilding(controller=controller, duration=60.0).run())
 
 
 def bridge() -> Iterator[tuple[str, str]]:
     """El Centro on the highway bridge, 20 s."""
     for controller in ("scwnn", "lqg"):
-        found = highway_bridge.run(record="el-centro", controller=controller, duration=20.0, compare=False)
-        yield controller, digest(found)
+        study = HighwayBridge(record="el-centro", controller=controller, duration=20.0, compare=False)
+        yield controller, digest(study.run())
 
 
 def ssp() -> Iterator[tuple[str, str]]:
     """Chattering, case 6, out as an SSP and in again."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "chattering.ssp"
-        export_ssp(chattering.build(case=6), path, step=0.01, stop=10.0)
+        export_ssp(Chattering(case=6).build(), path, step=0.01, stop=10.0)
         yield "case 6", digest(simulate(read_ssp(path), step=0.01, stop=10.0))
 
 

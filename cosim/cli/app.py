@@ -1,33 +1,38 @@
 """The command line: cosim list, run, table, export, inspect, doctor.
 
-The outermost layer: it alone may import scenarios, controllers and fmus, and does so
-when a command needs them. Options of a scenario are the keyword arguments of its
-functions; nothing is declared twice. An error of the user's ends with exit code 2 and
-a text of one screen, an interrupted run with 130.
+The outermost layer: only the command line imports scenarios, controllers and fmus, and it
+does so when a command needs them. The options of a scenario are the fields of its study
+or the keyword arguments of its functions. A user's error ends with exit code 2 and one
+screen of text, an interrupted run with 130.
 """
 
 from __future__ import annotations
 
 import inspect
-import json
-import math
+import os
 import sys
-import typing
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
 from ..errors import CosimError, SimulationEndedWarning
-from ..result import Result
+from ..result import Interrupted, Result, SimulationError
 from ..system.system import System
-from .scenario import Scenario, ScenarioError, load_scenario, scenario_names
+from .json_text import json_text
+from .load import find_participant, load_scenario
+from .run_directory import RunDirectory
+from .scenario import Options, Scenario, ScenarioError, aligned, scenario_names, summary
 
-_app = App(
-    name="cosim", help="Co-simulation of vibration-controlled structures.", result_action="return_value"
-)
+_SETTINGS: dict[str, Any] = {
+    "result_action": "return_value",
+    "suppress_keyboard_interrupt": False,
+    "default_parameter": Parameter(negative_iterable=()),  # no --empty-... in the help
+}
+_app = App(name="cosim", help="Co-simulation of vibration-controlled structures.", **_SETTINGS)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -35,45 +40,44 @@ def main(arguments: Sequence[str] | None = None) -> None:
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     try:
         _dispatch(tokens)
+        sys.stdout.flush()
     except (CosimError, CycloptsError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {error}", *_notes(error), sep="\n", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print("interrupted", *_notes(interrupt), sep="\n", file=sys.stderr)
         sys.exit(130)
+    except BrokenPipeError:  # the reader, such as head, has closed the pipe
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _notes(error: BaseException) -> list[str]:
+    return getattr(error, "__notes__", [])
 
 
 def _dispatch(tokens: list[str]) -> None:
     """Call a command; `run` and `table` take their options from the scenario that they name."""
     if len(tokens) > 1 and tokens[0] in ("run", "table") and not tokens[1].startswith("-"):
         scenario = load_scenario(tokens[1])
-        app = App(name=f"cosim {tokens[0]} {scenario.name}", result_action="return_value")
+        app = App(name=f"cosim {tokens[0]} {scenario.name}", **_SETTINGS)
         app.default(_run_command(scenario) if tokens[0] == "run" else _table_command(scenario))
         app(tokens[2:], exit_on_error=False, print_error=False)
     else:
         _app(tokens, exit_on_error=False, print_error=False)
 
 
-def _with_options(
-    function: Callable[..., Any], body: Callable[..., None], **more: Any
-) -> Callable[..., None]:
-    """Return `body` with the signature of `function` (less `progress`) and the options `more`."""
+def _command(options: Options, body: Callable[..., None], **own: Any) -> Callable[..., None]:
+    """Return `body` as a command with the options of a study or table, and options of its own."""
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    added = [inspect.Parameter(n, keyword, default=d, annotation=a) for n, (a, d) in own.items()]
 
-    def command(**options: Any) -> None:
-        body(**{n: default for n, (_, default) in more.items()} | options)
+    def command(**given: Any) -> None:
+        body(*options.make(**{n: v for n, v in given.items() if n not in own}),
+             **{n: given.get(n, default) for n, (_, default) in own.items()})  # fmt: skip
 
-    hints = typing.get_type_hints(function, include_extras=True)
-    own = [
-        p.replace(annotation=hints.get(n, str), kind=inspect.Parameter.KEYWORD_ONLY)
-        for n, p in inspect.signature(function).parameters.items()
-        if n != "progress"
-    ]
-    added = [
-        inspect.Parameter(n, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-        for n, (annotation, default) in more.items()
-    ]
-    command.__doc__ = function.__doc__
-    command.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
+    command.__doc__ = options.doc
+    command.__signature__ = inspect.Signature([*options.parameters, *added])  # type: ignore[attr-defined]
     return command
 
 
@@ -83,8 +87,6 @@ def _with_options(
 @_app.command(name="list")
 def list_scenarios() -> None:
     """List the scenarios."""
-    from .scenario import summary
-
     names = scenario_names()
     width = max(map(len, names), default=0)
     for name in names:
@@ -93,76 +95,63 @@ def list_scenarios() -> None:
 
 @_app.command
 def run(scenario: str) -> None:
-    """Run a scenario, a file of yours like one, or an FMU; `cosim run NAME --help` lists its options."""
+    """Run a scenario, your own Python file, an FMU or an SSP; `cosim run NAME --help` lists its options."""
 
 
 @_app.command
 def table(scenario: str) -> None:
-    """Print the table of a scenario, printed beside computed; `cosim table NAME --help` for options."""
+    """Print the table of a scenario; `cosim table NAME --help` lists its options."""
 
 
 def _run_command(scenario: Scenario) -> Callable[..., None]:
     out_type = Annotated[Path | None, Parameter(help="folder for metrics, result and figures [out/NAME]")]
     figures_type = Annotated[bool, Parameter(help="draw the figures")]
 
-    def body(out: Path | None, figures: bool, **options: Any) -> None:
-        from .run_directory import write_run
-
-        directory = out or Path("out") / scenario.name
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SimulationEndedWarning)  # it is among the lines
-            result = _with_progress(
-                scenario.run, options, lambda part: write_run(directory, scenario, options, part)
-            )
-        for line in write_run(directory, scenario, options, result, figures=figures):
+    def body(study: Any, options: dict[str, Any], out: Path | None, figures: bool) -> None:
+        folder = RunDirectory(out or Path("out") / scenario.name)
+        try:
+            with warnings.catch_warnings(), _progress(study.run) as more:
+                warnings.simplefilter("ignore", SimulationEndedWarning)  # a line of the output says it
+                result: Result = study.run(**more)
+        except (SimulationError, Interrupted) as error:
+            if error.result is not None:
+                *_, kept = folder.save(scenario, study, options, error.result)
+                error.add_note(f"kept: {kept}")
+            raise
+        for line in folder.save(scenario, study, options, result, figures=figures):
             print(line)
 
-    return _with_options(scenario.run, body, out=(out_type, None), figures=(figures_type, True))
+    return _command(scenario.study(), body, out=(out_type, None), figures=(figures_type, True))
 
 
 def _table_command(scenario: Scenario) -> Callable[..., None]:
     json_type = Annotated[bool, Parameter(help="print the rows as JSON")]
 
-    def body(json: bool, **options: Any) -> None:
-        rows = _with_progress(scenario.function("table"), options, lambda part: None)
-        print(_as_json(rows) if json else scenario.table_text(rows))
+    def body(table: Any, _: dict[str, Any], json: bool) -> None:
+        with _progress(table.rows) as more:
+            rows = table.rows(**more)
+        print(json_text(rows) if json else getattr(table, "text", aligned)(rows))
 
-    return _with_options(scenario.function("table"), body, json=(json_type, False))
-
-
-def _as_json(rows: list[dict[str, Any]]) -> str:
-    """Return rows as JSON; JSON has no NaN and no infinity, so what is not finite is null."""
-
-    def plain(value: Any) -> Any:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return json.dumps([{n: plain(v) for n, v in row.items()} for row in rows], indent=1, default=float)
+    return _command(scenario.table(), body, json=(json_type, False))
 
 
-def _with_progress(
-    function: Callable[..., Any], options: dict[str, Any], keep: Callable[[Result], Any]
-) -> Any:
-    """Call a function of a scenario, with a progress bar if it takes one; keep an unfinished result."""
-    from ..result import Interrupted, SimulationError
+@contextmanager
+def _progress(function: Callable[..., Any]) -> Iterator[dict[str, Any]]:
+    """Show a progress bar for a function that reports its progress; yield the argument that it takes."""
+    if "progress" not in inspect.signature(function).parameters:
+        yield {}
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    try:
-        if "progress" not in inspect.signature(function).parameters:
-            return function(**options)
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-        columns = [TextColumn("{task.completed}/{task.total}"), BarColumn(), TimeElapsedColumn()]
-        console = Console(stderr=True)
-        shown = Progress(
-            *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
-        )
-        with shown as bar:
-            task = bar.add_task("", total=None)
-            return function(**options, progress=lambda k, n: bar.update(task, completed=k, total=n))
-    except (SimulationError, Interrupted) as error:
-        if error.result is not None:
-            keep(error.result)
-        raise
+    columns = (TextColumn("{task.completed}/{task.total}"), BarColumn(), TimeElapsedColumn())
+    console = Console(stderr=True)
+    shown = Progress(
+        *columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal
+    )
+    with shown as bar:
+        task = bar.add_task("", total=None)
+        yield {"progress": lambda k, n: bar.update(task, completed=k, total=n)}
 
 
 @_app.command
@@ -181,23 +170,21 @@ def export(
     Parameters
     ----------
     what
-        scenario:participant, such as chattering:plant or my_scenario.py:controller; a scenario
-        alone is the system
+        scenario:participant, such as chattering:plant or my_scenario.py:controller; the name of a
+        scenario alone exports its whole system
     out
-        the file to write [PARTICIPANT.fmu, SCENARIO.ssp]; a system as .fmu is a container of FMUs
+        file to write [PARTICIPANT.fmu, SCENARIO.ssp]; a system written to .fmu is a container of FMUs
     platform
         x86_64-linux, aarch64-linux, x86_64-windows, x86_64-darwin, aarch64-darwin; may be repeated
         [this machine]
     fmi_version
-        of FMUs that are made: 2.0, or 3.0, in which arrays are arrays [2.0]
+        version of the FMUs: 2.0, or 3.0, which has array variables [2.0]
     ssp_version
-        1.0, or 2.0 for arrays and types of FMI 3.0 [1.0 where it can say what the system is]
+        1.0, or 2.0 for arrays and types of FMI 3.0 [1.0 where it can express the system]
     step, stop
-        what a system is to be run with, s [what the scenario says]
+        default experiment of a system, s [STEP and STOP of the scenario]
     """
     from fmus.export.fmu import export as export_fmu
-
-    from .scenario import find_participant
 
     platforms = list(platform) or None
     if ":" in what:
@@ -208,7 +195,9 @@ def export(
         scenario = load_scenario(what)
         path = out or Path(f"{scenario.name}.ssp")
         experiment = {"step": step or scenario.seconds("STEP"), "stop": stop or scenario.seconds("STOP")}
-        _export_system(scenario.function("build")(), path, platforms, fmi_version, ssp_version, **experiment)
+        _export_system(
+            scenario.default_study().build(), path, platforms, fmi_version, ssp_version, **experiment
+        )
     print(f"{path} ({path.stat().st_size / 1024:.0f} KB)")
 
 
@@ -237,17 +226,17 @@ def _export_system(
         from fmus.packaging.container import export_container
 
         if step is None:
-            raise ScenarioError("a container steps what is in it; give its step in seconds, --step 0.01")
+            raise ScenarioError("a container needs its communication step; give it in seconds, --step 0.01")
         if platforms:
-            raise ScenarioError("a container is for the machine that makes it, not for --platform")
+            raise ScenarioError("a container is made for this machine only; leave out --platform")
         export_container(system, path, step=step, stop=stop, fmi_version=fmi_version or "2.0")
     else:
-        raise ScenarioError(f"a system leaves as an .ssp, or as an .fmu that holds it all, not as {path}")
+        raise ScenarioError(f"a system is exported as an .ssp or as one .fmu, not as {path}; change --out")
 
 
 @_app.command(name="inspect")
 def inspect_fmu(fmu: Path) -> None:
-    """Show what an FMU is: capabilities, default experiment, variables with units and start values."""
+    """Show capabilities, default experiment and variables of an FMU."""
     from .inspection import inspection
 
     print(inspection(fmu))
@@ -257,10 +246,10 @@ def inspect_fmu(fmu: Path) -> None:
 def doctor(
     fmu: Path, *, json: bool = False, probe: tuple[str, ...] = (), time_limit: float | None = None
 ) -> None:
-    """Examine what an FMU really does: validity, reset, state, leaks, feedthrough, step size, misuse.
+    """Examine how an FMU behaves: validity, reset, state, leaks, feedthrough, step size, misuse.
 
-    The exit code is that of the worst finding: 0 ok or notes, 1 warnings, 2 errors (as of wrong
-    options, which print no report), 3 a crash or a hang.
+    The exit code reflects the worst finding: 0 ok or notes, 1 warnings, 2 errors (or wrong options,
+    then without a report), 3 a crash or a hang.
 
     Parameters
     ----------
@@ -269,9 +258,9 @@ def doctor(
     json
         print the report as JSON
     probe
-        a probe to run, such as reset; may be repeated [all]
+        probe to run, such as reset; may be repeated [all]
     time_limit
-        seconds that a probe may take [60]
+        longest duration of a probe, s [60]
     """
     from ..doctor import examine
     from ..doctor.examination import TIME_LIMIT

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,123 +24,99 @@ from .scenario import Scenario
 _TRUTH = {"true": 1, "false": 0}
 
 
-def fmu_scenario(path: Path) -> Scenario:
-    """Return the scenario of an FMU: it alone, inputs from a file, times from its default experiment."""
-    name = path.stem if re.fullmatch(r"[A-Za-z_]\w*", path.stem) else "fmu"
+@dataclass(frozen=True, kw_only=True)
+class FMUStudy:
+    """Run one FMU."""
 
-    def build(
-        *,
-        interface: Interface | None = None,
-        solver: Solver | None = None,
-        substeps: int = 1,
-        tolerance: float | None = None,
-        event_mode: bool | None = None,
-        isolated: bool = False,
-        input: Path | None = None,
-        start: tuple[str, ...] = (),
-    ) -> System:
-        values = start_values(FMU(path), start) if start else {}
+    path: ClassVar[Path]  # a subclass for each file sets it
+
+    stop: float | None = None
+    """time at which the run stops, s [the FMU's default]"""
+    step: float | None = None
+    """communication step, s [the FMU's default]"""
+    start_time: float | None = None
+    """time at which the run starts, s [the FMU's default, or 0]"""
+    interface: Interface | None = None
+    """CoSimulation or ModelExchange, for an FMU that offers both [CoSimulation]"""
+    solver: Solver | None = None
+    """solver of Model Exchange: ode1 to ode4, cvode [ode4; cvode for an FMU with event indicators]"""
+    substeps: int = 1
+    """steps of ode1 to ode4 in a communication step"""
+    tolerance: float | None = None
+    """relative tolerance of cvode [1e-6]"""
+    event_mode: bool | None = None
+    """handle events of Co-Simulation at their instants [for an FMU with clocks]"""
+    isolated: bool = False
+    """run the FMU in a process of its own, so that a crash of the FMU becomes an error"""
+    input: Path | None = None
+    """CSV file with time and inputs by name; continuous inputs are interpolated, others are held"""
+    start: tuple[str, ...] = ()
+    """name=value of a parameter or start value; a value may have a unit ("30 deg"), an array is
+    written "1 2 3"; may be repeated"""
+    record: tuple[str, ...] = ()
+    """variable to record; may be repeated [all outputs]"""
+
+    @property
+    def name(self) -> str:
+        """The FMU's name in the system: that of its file where it is a Python name."""
+        stem = self.path.stem
+        return stem if re.fullmatch(r"[A-Za-z_]\w*", stem) else "fmu"
+
+    def build(self) -> System:
+        """Return a system of the FMU and its inputs."""
+        values = start_values(FMU(self.path), self.start) if self.start else {}
         fmu = FMU(
-            path,
+            self.path,
             start=values,
-            interface=interface,
-            solver=solver,
-            substeps=substeps,
-            tolerance=tolerance,
-            event_mode=event_mode,
-            isolated=isolated,
+            interface=self.interface,
+            solver=self.solver,
+            substeps=self.substeps,
+            tolerance=self.tolerance,
+            event_mode=self.event_mode,
+            isolated=self.isolated,
         )
-        system = System({name: fmu})
-        if input is not None:
-            connect_inputs(system, name, input)
+        system = System({self.name: fmu})
+        if self.input is not None:
+            connect_inputs(system, self.name, self.input)
         return system
 
-    def run(
-        *,
-        stop: float | None = None,
-        step: float | None = None,
-        start_time: float | None = None,
-        interface: Interface | None = None,
-        solver: Solver | None = None,
-        substeps: int = 1,
-        tolerance: float | None = None,
-        event_mode: bool | None = None,
-        isolated: bool = False,
-        input: Path | None = None,
-        start: tuple[str, ...] = (),
-        record: tuple[str, ...] = (),
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Result:
-        """Run one FMU.
-
-        Parameters
-        ----------
-        stop
-            time to stop at, in s [the FMU's default]
-        step
-            communication step, in s [the FMU's default]
-        start_time
-            time to start at, in s [the FMU's default, or 0]
-        interface
-            CoSimulation or ModelExchange, where there are both [CoSimulation]
-        solver
-            of Model Exchange: ode1 to ode4, cvode [ode4; cvode if there are event indicators]
-        substeps
-            steps of ode1 to ode4 in a communication step
-        tolerance
-            relative tolerance of cvode [1e-6]
-        event_mode
-            of Co-Simulation: handle events at their instants [where the FMU has clocks]
-        isolated
-            run the FMU in a process of its own: a crash of it is an error here
-        input
-            CSV file: time and inputs by name; linear for continuous inputs, held for others
-        start
-            name=value of a parameter or start value, with a unit ("30 deg") if it is another one than the
-            variable's; arrays as "1 2 3"; may be repeated
-        record
-            variable to record; may be repeated [all outputs]
-        """
-        system = build(
-            interface=interface,
-            solver=solver,
-            substeps=substeps,
-            tolerance=tolerance,
-            event_mode=event_mode,
-            isolated=isolated,
-            input=input,
-            start=start,
-        )
-        fmu = system.participants[name]
+    def run(self, progress: Callable[[int, int], None] | None = None) -> Result:
+        """Run the FMU; times that are not given are those of its default experiment."""
+        system = self.build()
+        fmu = system.participants[self.name]
         assert isinstance(fmu, FMU)
-        begin, end, h = _times(fmu, start_time, stop, step)
-        start_from_inputs(system, name, begin)
-        wanted = list(record) or [*fmu.declared_outputs]
-        recorded = [f"{name}.{variable}" for variable in wanted]
+        begin, end, h = _times(fmu, self.start_time, self.stop, self.step)
+        start_from_inputs(system, self.name, begin)
+        recorded = [f"{self.name}.{variable}" for variable in self.record or fmu.declared_outputs]
         return simulate(system, step=h, start=begin, stop=end, record=recorded, progress=progress)
 
-    module = ModuleType(path.stem)
-    module.__dict__.update(build=build, run=run, metrics=_metrics)
-    return Scenario(path.stem, module)
+    def metrics(self, result: Result) -> dict[str, tuple[float, str]]:
+        """Return peak and RMS of all recorded variables, arrays by element."""
+        found: dict[str, tuple[float, str]] = {}
+        for kind in ("peak", "rms"):
+            for name, statistics in result.statistics.items():
+                values = np.atleast_1d(getattr(statistics, kind))
+                scalar = np.ndim(getattr(statistics, kind)) == 0
+                for i, value in enumerate(values):
+                    element = name if scalar else f"{name}[{i + 1}]"
+                    found[f"{kind} {element}"] = (float(value), result.units.get(name) or "")
+        return found
 
 
-def _metrics(result: Result) -> dict[str, tuple[float, str]]:
-    """Return peak and RMS of everything that is recorded, arrays by element."""
-    found: dict[str, tuple[float, str]] = {}
-    for kind in ("peak", "rms"):
-        for name, statistics in result.statistics.items():
-            values = np.atleast_1d(getattr(statistics, kind))
-            scalar = np.ndim(getattr(statistics, kind)) == 0
-            for i, value in enumerate(values):
-                element = name if scalar else f"{name}[{i + 1}]"
-                found[f"{kind} {element}"] = (float(value), result.units.get(name) or "")
-    return found
+def fmu_study(path: Path) -> type[FMUStudy]:
+    """Return the study of an FMU file."""
+    return type("Study", (FMUStudy,), {"path": path, "__module__": __name__, "__doc__": FMUStudy.__doc__})
+
+
+def fmu_scenario(path: Path) -> Scenario:
+    """Return the scenario of an FMU file."""
+    return Scenario(path.stem, SimpleNamespace(Study=fmu_study(path)))
 
 
 def _times(
     fmu: FMU, start: float | None, stop: float | None, step: float | None
 ) -> tuple[float, float, float]:
-    """Return start, stop and step: what is given, else what the FMU gives."""
+    """Return start, stop and step: the given values, or else those of the FMU's default experiment."""
     experiment = fmu.description.defaultExperiment
     given = (
         {}
@@ -168,7 +145,9 @@ def _time(fmu: FMU, asked: float | None, default: Any, name: str) -> float | Non
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise FMUError(f"{fmu.path.name}: {name}={default!r} of its default experiment is no number")
+        raise FMUError(
+            f"{fmu.path.name}: {name}={default!r} of its default experiment must be a finite number"
+        )
     return value
 
 
@@ -201,4 +180,4 @@ def _value(name: str, kind: str, text: str) -> Any:
         ]
         return values[0] if len(values) == 1 else values
     except ValueError:
-        raise FMUError(f"--start {name}={text}: '{text}' is no value of type {kind}") from None
+        raise FMUError(f"--start {name}={text}: '{text}' is not a value of type {kind}") from None

@@ -5,9 +5,9 @@
     1,2.5,0,2
 
 The first column is the time in s; the others are named as inputs or elements of arrays.
-Continuous inputs are linear between the rows, the others are held; two rows at one time
-are a jump. The cell of an array has its elements with blanks between them. Between
-communication points every input is held, as sampled coupling says; the FMU is initialized
+Continuous inputs are interpolated linearly between the rows, the others are held; two rows
+at one time are a jump. The cell of an array holds its elements, separated by blanks.
+Sampled coupling holds every input between communication points; the FMU is initialized
 with the values at the start.
 """
 
@@ -29,13 +29,13 @@ _WORDS = {"true": 1.0, "false": 0.0}
 
 
 def connect_inputs(system: System, name: str, path: Path) -> None:
-    """Feed the inputs of the FMU that is `name` in a system from a CSV file."""
+    """Connect the inputs of the FMU `name` of a system to the columns of a CSV file."""
     fmu = system.participants[name]
     assert isinstance(fmu, FMU)
     header, lines = _read(path)
     for column, input_name in list(enumerate(header))[1:]:
         if column != header.index(input_name):
-            raise RecordError(f"{path}: there are two columns {input_name}; leave one out")
+            raise RecordError(f"{path}: there are two columns {input_name}; remove one")
         _check_input(path, fmu, input_name)
     instants = np.array([_number(path, i, "time", cells[0]) for i, cells in lines])
     for (i, _), before, t in zip(lines[1:], instants, instants[1:], strict=False):
@@ -54,7 +54,7 @@ def connect_inputs(system: System, name: str, path: Path) -> None:
 
 
 def start_from_inputs(system: System, name: str, t: float) -> None:
-    """Let inputs that are fed from a file have their value at t at the start, unless one is given."""
+    """Start the inputs that a file supplies with their values at t, unless start values are given."""
     fmu = system.participants[name]
     assert isinstance(fmu, FMU)
     for c in system.connections:
@@ -68,18 +68,18 @@ def start_from_inputs(system: System, name: str, t: float) -> None:
 
 
 def _read(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the header, and the other lines with their numbers."""
+    """Return the header, and the other lines with their line numbers."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise RecordError(f"{path} cannot be read ({error.strerror}); check the path") from error
     except UnicodeDecodeError as error:
-        raise RecordError(f"{path} is no text in UTF-8; give a CSV file") from error
+        raise RecordError(f"{path} is not text in UTF-8; give a CSV file") from error
     try:
         reader = csv.reader(text.splitlines(), skipinitialspace=True, strict=True)
         lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if cells]
     except csv.Error as error:
-        raise RecordError(f"{path} is no CSV file: {error}") from error
+        raise RecordError(f"{path} is not a CSV file: {error}") from error
     if len(lines) < 2 or len(lines[0][1]) < 2:
         raise RecordError(f"{path}: give a header, time and names of inputs, and at least one row")
     header = lines[0][1]
@@ -95,8 +95,8 @@ def _check_input(path: Path, fmu: FMU, name: str) -> None:
     variable = fmu.variables.get(name)
     if variable is not None and variable.causality == "input" and variable.type not in fmu.adapter.NUMBERS:
         raise RecordError(
-            f"{path}: {name} is a {variable.type}, and inputs over time are numbers; "
-            "leave the column out and give it a start value"
+            f"{path}: {name} is a {variable.type}, and inputs over time must be numbers; "
+            "leave out the column and give a start value"
         )
     if name.partition("[")[0] not in fmu.inputs and name not in fmu.inputs:
         raise RecordError(f"{path}: {fmu.path.name} has no input '{name}'" + did_you_mean(name, fmu.inputs))
@@ -109,7 +109,7 @@ def _number(path: Path, line: int, name: str, text: str) -> float:
     except ValueError:
         value = math.nan
     if abs(value) >= 2.0**53 and re.fullmatch(r"[+-]?\d+", text) and int(value) != int(text):
-        raise RecordError(f"{path}:{line}: {name} is {text}, which is above 2^53: a float does not hold it")
+        raise RecordError(f"{path}:{line}: {name} is {text}, which a float above 2^53 cannot represent")
     if not math.isfinite(value):
-        raise RecordError(f"{path}:{line}: {name} is '{text}', which is no finite number")
+        raise RecordError(f"{path}:{line}: {name} is '{text}', which is not a finite number")
     return value

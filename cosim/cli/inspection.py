@@ -1,4 +1,4 @@
-"""`cosim inspect`: what an FMU is, as text."""
+"""`cosim inspect`: capabilities and variables of an FMU as text."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from ..fmi.file.model_description import description_of, parse
 from ..fmi.ports import display_unit_of, unit_of
 from .scenario import aligned
 
+_LONGEST_START = 40
+
 
 def inspection(path: Path) -> str:
     """Return capabilities, default experiment and variables of an FMU."""
@@ -19,7 +21,7 @@ def inspection(path: Path) -> str:
     facts = [
         ("model", f"{description.modelName}, FMI {description.fmiVersion}"),
         ("made by", f"{description.generationTool or 'unknown'}, {description.generationDateAndTime or ''}"),
-        ("about", (description.description or "").partition("\n")[0]),
+        ("description", (description.description or "").partition("\n")[0]),
         ("platforms", ", ".join(platforms) or "none (sources only)"),
         ("Co-Simulation", _capabilities(root, "CoSimulation")),
         ("Model Exchange", _capabilities(root, "ModelExchange")),
@@ -75,14 +77,25 @@ def _row(variable: Any) -> dict[str, Any]:
         "unit": unit_of(variable) or "-",
         "start": _start(variable),
         "display": display_unit_of(variable) or "-",
+        "variability": variable.variability or "-",
+        "min": _bound(variable, "min"),
+        "max": _bound(variable, "max"),
         "meaning": variable.description or "",
     }
 
 
+def _bound(variable: Any, name: str) -> str:
+    """Return min or max of a variable, or of its declared type."""
+    declared = getattr(variable, "declaredType", None)
+    value = getattr(variable, name, None) or getattr(declared, name, None)
+    return "-" if value is None else str(value)
+
+
 def _start(variable: Any) -> str:
-    """Return the start value, of a clock when it ticks."""
+    """Return the start value, shortened for long arrays; of a clock the times of its ticks."""
     if variable.type != "Clock":
-        return str(variable.start) if variable.start is not None else "-"
+        text = str(variable.start) if variable.start is not None else "-"
+        return text if len(text) <= _LONGEST_START else text[: _LONGEST_START - 3].rstrip() + "..."
     interval, shift = interval_of(variable)
     every = "" if interval is None else f", every {interval:g} s" + (f" from {shift:g} s" if shift else "")
     return f"{variable.intervalVariability}{every}"

@@ -1,71 +1,108 @@
-"""What a run leaves on disk: metrics.json, result.npz, figures as PNG and SVG."""
+"""The folder of a run: metrics.json, result.npz, figures as PNG and SVG.
+
+Every file is written under a temporary name and then renamed, so that a reader, or a run
+that is killed, never leaves half a file under its final name.
+"""
 
 from __future__ import annotations
 
-import inspect
-import json
+import os
 import platform
 import sys
+from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from ..result import Result
-from .scenario import Scenario
+from .json_text import json_text
+from .scenario import Scenario, ScenarioError
 
 _TOOLS = ("structcosim", "fmpy", "numpy", "scipy", "numba", "llvmlite", "matplotlib")
 
 
-def write_run(
-    directory: Path, scenario: Scenario, options: dict[str, Any], result: Result, figures: bool = False
-) -> list[str]:
-    """Write a run to its folder; return lines that say what was found and where it is."""
-    directory.mkdir(parents=True, exist_ok=True)
-    metrics = scenario.metrics(result)
-    options = defaults(scenario) | options
-    record = {
-        "scenario": scenario.name,
-        "command": " ".join(["cosim", *sys.argv[1:]]),
-        "options": {
-            n: v if isinstance(v, (int, float, str, bool, type(None))) else str(v) for n, v in options.items()
-        },
-        "seed": options.get("seed"),
-        "metrics": {n: {"value": float(v), "unit": unit} for n, (v, unit) in metrics.items()},
-        "steps": result.steps,
-        "step": {"value": result.step, "unit": "s"},
-        "loop": {"value": result.seconds, "unit": "s"},
-        "interrupted": result.interrupted,
-        "ended": result.ended,
-        "schedule": result.schedule.splitlines(),
-        "versions": {name: version(name) for name in _TOOLS} | {"python": platform.python_version()},
-    }
-    (directory / "metrics.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    result.save(directory / "result.npz")
-    names = _draw(directory / "figures", scenario, result) if figures else []
-    width = max(map(len, metrics), default=0)
-    lines = [f"{name:<{width}}  {value:12.6g}  {unit}".rstrip() for name, (value, unit) in metrics.items()]
-    drawn = f", {len(names)} figures" if names else ""
-    return [
-        *lines,
-        *([result.ended] if result.ended else []),
-        f"{result.steps} steps in {result.seconds:.3g} s; {directory}: metrics.json, result.npz{drawn}",
-    ]
+class RunDirectory:
+    """The folder that a run writes to; it is made, and tried, before the run."""
 
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        self._write("metrics.json", lambda _: None, keep=False)
 
-def defaults(scenario: Scenario) -> dict[str, Any]:
-    """Return the options of a scenario's run function and their defaults."""
-    parameters = inspect.signature(scenario.run).parameters
-    return {n: p.default for n, p in parameters.items() if p.default is not p.empty and n != "progress"}
+    def _unwritable(self, error: OSError) -> ScenarioError:
+        return ScenarioError(
+            f"--out {self.path}: {error.strerror or error}; name a folder that can be written to"
+        )
 
+    def _write(self, name: str, write: Callable[[Path], Any], *, keep: bool = True) -> None:
+        """Write a file under a temporary name and rename it."""
+        path = self.path / name
+        temporary = path.with_name(f".{os.getpid()}-{path.name}")
+        try:
+            temporary.touch()
+            write(temporary)
+            if keep:
+                temporary.replace(path)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        finally:
+            temporary.unlink(missing_ok=True)
 
-def _draw(directory: Path, scenario: Scenario, result: Result) -> list[str]:
-    import matplotlib
+    def save(
+        self,
+        scenario: Scenario,
+        study: Any,
+        options: dict[str, Any],
+        result: Result,
+        *,
+        figures: bool = False,
+    ) -> list[str]:
+        """Write a run; return its metrics as lines of text, and a last line with the files."""
+        metrics = scenario.metrics(study, result)
+        record = {
+            "scenario": scenario.name,
+            "command": " ".join(["cosim", *sys.argv[1:]]),
+            "options": {
+                n: v if isinstance(v, (int, float, str, bool, type(None))) else str(v)
+                for n, v in options.items()
+            },
+            "seed": options.get("seed"),
+            "metrics": {n: {"value": v, "unit": unit} for n, (v, unit) in metrics.items()},
+            "steps": result.steps,
+            "step": {"value": result.step, "unit": "s"},
+            "loop": {"value": result.seconds, "unit": "s"},
+            "interrupted": result.interrupted,
+            "ended": result.ended,
+            "schedule": result.schedule.splitlines(),
+            "versions": {name: version(name) for name in _TOOLS} | {"python": platform.python_version()},
+        }
+        self._write("result.npz", result.save)
+        text = json_text(record) + "\n"
+        self._write("metrics.json", lambda path: path.write_text(text, encoding="utf-8"))
+        names = self._draw(study, result) if figures else []
+        width = max(map(len, metrics), default=0)
+        lines = [f"{n:<{width}}  {v:12.6g}  {unit}".rstrip() for n, (v, unit) in metrics.items()]
+        drawn = f", {len(names)} figures" if names else ""
+        return [
+            *lines,
+            *([result.ended] if result.ended else []),
+            f"{result.steps} steps in {result.seconds:.3g} s; {self.path}: metrics.json, result.npz{drawn}",
+        ]
 
-    matplotlib.use("Agg")
-    drawn = scenario.figures(result)
-    if drawn:
-        directory.mkdir(exist_ok=True)
-    for name, figure in drawn.items():
-        for ending in ("png", "svg"):
-            figure.savefig(directory / f"{name}.{ending}", dpi=130)
-    return list(drawn)
+    def _draw(self, study: Any, result: Result) -> list[str]:
+        if not callable(getattr(study, "figures", None)):
+            return []
+        import matplotlib  # takes longer than many a run
+
+        matplotlib.use("Agg")
+        drawn = study.figures(result)
+        if drawn:
+            (self.path / "figures").mkdir(exist_ok=True)
+        for name, figure in drawn.items():
+            for ending in ("png", "svg"):
+                self._write(f"figures/{name}.{ending}", partial(figure.savefig, dpi=130))
+        return list(drawn)

@@ -1,31 +1,49 @@
-"""Scenarios: modules with `build` and `run`, found by name or by file.
+"""Scenarios: Python modules that define a study, found by name or by file.
 
-A scenario is a Python file with these functions; options are keyword arguments with
-types and defaults.
+A scenario is a Python module that defines a study as a frozen dataclass. Its fields are
+the options of the command line, and the docstring below a field is that option's help.
 
-    build(**options) -> System
-    run(**options) -> Result
-    metrics(result) -> {name: (value, unit)}                optional
-    figures(result) -> {name: matplotlib figure}            optional
-    table(**options) -> [row, ...]                          optional, rows are dicts
-    table_text(rows) -> str                                 optional
-    STEP, STOP                                              optional, s: what an exported system is run with
+    @dataclass(frozen=True, kw_only=True)
+    class Study:
+        b: float = 1.5
+        \"\"\"damping, N*s/m\"\"\"
 
-An .fmu and an .ssp are scenarios too (fmu_scenario.py, ssp_scenario.py).
+        build() -> System
+        run(progress=None) -> Result
+        metrics(result) -> {name: (value, unit)}      optional
+        figures(result) -> {name: matplotlib figure}  optional
+
+    @dataclass(frozen=True, kw_only=True)
+    class Table:                                      optional
+        rows() -> [row, ...]                          rows are dicts with the same keys
+        text(rows) -> str                             optional
+
+    STEP, STOP                                        optional, s: the default experiment on export
+
+The light form is a module of functions with keyword arguments: build(**options),
+run(**options), metrics(result), figures(result), table(**options), table_text(rows).
+
+A scenario with a folder of its own defines `Study` in study.py and `Table` in table.py.
 """
 
 from __future__ import annotations
 
 import ast
+import dataclasses
 import importlib
 import importlib.util
+import inspect
 import pkgutil
 import sys
+import typing
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from traceback import extract_tb
-from types import ModuleType
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from ..core.participant import Participant
 from ..errors import CosimError, WiringError, did_you_mean
@@ -34,83 +52,158 @@ from ..result import Result
 
 
 class ScenarioError(CosimError):
-    """A scenario that is not there or that lacks a function."""
+    """A scenario that does not exist, or that lacks a part which a command needs."""
 
 
-def scenario_names() -> list[str]:
-    """Return the names of the scenarios that come with the installation."""
-    package = importlib.import_module("scenarios")
-    return sorted(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
+class Options:
+    """The options of a study or a table: a dataclass, or a function of the light form.
 
+    `parameters` declares them to the command line; `make` returns the study or the table
+    with the options that were given, and those options by name.
+    """
 
-def _module_of(name: str) -> str:
-    """Return the module of a scenario: a file, or the file study.py of a folder."""
-    spec = importlib.util.find_spec(f"scenarios.{name}")
-    is_folder = spec is not None and spec.submodule_search_locations is not None
-    return f"scenarios.{name}.study" if is_folder else f"scenarios.{name}"
+    def __init__(self, declared: Callable[..., Any], make: Callable[..., Any]) -> None:
+        self.doc = declared.__doc__
+        self._make = make
+        self._is_class = isinstance(declared, type)
+        signature = inspect.signature(declared)
+        if self._is_class:
+            # cyclopts flattens the dataclass and reads the docstrings of its fields
+            complete = all(p.default is not p.empty for p in signature.parameters.values())
+            self.parameters = [
+                inspect.Parameter(
+                    "options",
+                    inspect.Parameter.KEYWORD_ONLY,
+                    default=declared() if complete else inspect.Parameter.empty,
+                    annotation=Annotated[declared, Parameter(name="*")],
+                )
+            ]
+        else:
+            hints = typing.get_type_hints(declared, include_extras=True)
+            self.parameters = [
+                p.replace(annotation=hints.get(n, str), kind=inspect.Parameter.KEYWORD_ONLY)
+                for n, p in signature.parameters.items()
+                if n != "progress"
+            ]
 
-
-def summary(name: str) -> str:
-    """Return the first line of a scenario's docstring, without importing it."""
-    spec = importlib.util.find_spec(_module_of(name))
-    if spec is None or spec.origin is None:
-        return ""
-    text = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
-    return text.partition("\n")[0]
+    def make(self, **given: Any) -> tuple[Any, dict[str, Any]]:
+        """Return the study or the table, and its options by name."""
+        options = {p.name: p.default for p in self.parameters if p.default is not p.empty} | given
+        if self._is_class:
+            made = options["options"]
+            return made, {f.name: getattr(made, f.name) for f in dataclasses.fields(made)}
+        return self._make(options), options
 
 
 class Scenario:
-    """A scenario's module, with clear errors for what it lacks."""
+    """A scenario under its name, with clear errors for the parts that it lacks."""
 
-    def __init__(self, name: str, module: ModuleType) -> None:
+    def __init__(self, name: str, *modules: ModuleType | SimpleNamespace) -> None:
         self.name = name
-        self.module = module
+        self._parts = {n: part for module in modules for n, part in vars(module).items()}
 
-    def function(self, name: str) -> Callable[..., Any]:
-        """Return a function of the scenario; it must be there."""
-        found = getattr(self.module, name, None)
-        if not callable(found):
+    def _part(self, name: str) -> Any:
+        part = self._parts.get(name)
+        return part if callable(part) else None
+
+    def study(self) -> Options:
+        """Return the options of the study."""
+        if declared := self._part("Study"):
+            return Options(declared, declared)
+        run = self._part("run")
+        if run is None:
             raise ScenarioError(
-                f"scenario {self.name} has no function {name}(); a scenario defines build and run"
+                f"scenario {self.name} defines neither a class Study nor a function run(); add one of the two"
             )
-        function: Callable[..., Any] = found
-        return function
 
-    def seconds(self, name: str) -> float | None:
-        """Return STEP or STOP of the scenario, if it has one."""
-        found = getattr(self.module, name, None)
-        return float(found) if isinstance(found, (int, float)) else None
+        def functions(options: dict[str, Any]) -> SimpleNamespace:
+            return SimpleNamespace(**self._parts | {"run": partial(run, **options)})
 
-    @property
-    def run(self) -> Callable[..., Result]:
-        """The scenario's run function."""
-        return self.function("run")
+        return Options(run, functions)
 
-    def metrics(self, result: Result) -> dict[str, tuple[float, str]]:
-        """Return named numbers with units: the scenario's own, or peak and RMS of every scalar port."""
-        if hasattr(self.module, "metrics"):
-            found: dict[str, tuple[float, str]] = self.function("metrics")(result)
-            return found
-        scalars = {n: s for n, s in result.statistics.items() if isinstance(s.rms, float)}
-        unit = {n: result.units.get(n) or "" for n in scalars}
-        return {f"peak {n}": (float(s.peak), unit[n]) for n, s in scalars.items()} | {
-            f"rms {n}": (s.rms, unit[n]) for n, s in scalars.items()
-        }
+    def table(self) -> Options:
+        """Return the options of the table."""
+        if declared := self._part("Table"):
+            return Options(declared, declared)
+        table = self._part("table")
+        if table is None:
+            raise ScenarioError(
+                f"scenario {self.name} has no table; define a class Table with rows(), or a function table()"
+            )
+        text = {"text": self._parts["table_text"]} if self._part("table_text") else {}
+        return Options(table, lambda options: SimpleNamespace(rows=partial(table, **options), **text))
 
-    def figures(self, result: Result) -> dict[str, Any]:
-        """Return the figures of a result; none if the scenario draws none."""
-        found: dict[str, Any] = self.function("figures")(result) if hasattr(self.module, "figures") else {}
+    def default_study(self) -> Any:
+        """Return the study with its default options."""
+        options = self.study() if self._part("Study") else None
+        if options is None:  # of the light form only build() is needed
+            study: Any = SimpleNamespace(**self._parts)
+        elif any(p.default is p.empty for p in options.parameters):
+            raise ScenarioError(f"scenario {self.name}: give every option of Study a default")
+        else:
+            study, _ = options.make()
+        if not callable(getattr(study, "build", None)):
+            raise ScenarioError(f"scenario {self.name} has no build(); define it to return the System")
+        return study
+
+    def participant(self, name: str) -> Participant:
+        """Return a Python participant of the default system."""
+        system = self.default_study().build()
+        if name not in system.participants:
+            raise WiringError(
+                f"scenario {self.name} has no participant '{name}'" + did_you_mean(name, system.participants)
+            )
+        member = system.participants[name]
+        source = member if isinstance(member, Participant) else member.source
+        if source is None:
+            raise ScenarioError(f"{self.name}:{name} is already an FMU ({member.path}); copy that file")
+        found: Participant = source
         return found
 
-    def table_text(self, rows: list[dict[str, Any]]) -> str:
-        """Return the rows of a table as text: the scenario's own, or aligned columns."""
-        if hasattr(self.module, "table_text"):
-            return str(self.function("table_text")(rows))
-        return aligned(rows)
+    def seconds(self, name: str) -> float | None:
+        """Return STEP or STOP of the scenario, if it defines one."""
+        found = self._parts.get(name)
+        return float(found) if isinstance(found, (int, float)) else None
+
+    def metrics(self, study: Any, result: Any) -> dict[str, tuple[float, str]]:
+        """Return named numbers with units: the study's own, or peak and RMS of every scalar port."""
+        if not isinstance(result, Result):
+            raise ScenarioError(
+                f"scenario {self.name}: run() returned {_kind(result)}; return the Result of simulate()"
+            )
+        if callable(getattr(study, "metrics", None)):
+            found = study.metrics(result)
+            self._check_metrics(found)
+            return {n: (float(value), unit) for n, (value, unit) in found.items()}
+        scalars = {n: s for n, s in result.statistics.items() if isinstance(s.rms, float)}
+        return {
+            f"{kind} {n}": (float(getattr(s, kind)), result.units.get(n) or "")
+            for kind in ("peak", "rms")
+            for n, s in scalars.items()
+        }
+
+    def _check_metrics(self, found: Any) -> None:
+        where = f"scenario {self.name}: metrics()"
+        if not isinstance(found, dict):
+            raise ScenarioError(f"{where} returned {_kind(found)}; it must return {{name: (value, unit)}}")
+        for name, pair in found.items():
+            try:
+                value, unit = pair
+                float(value)
+            except (TypeError, ValueError):
+                raise ScenarioError(
+                    f"{where}: '{name}' is {pair!r}; give (value, unit), such as (0.012, 'm')"
+                ) from None
+            if not isinstance(unit, str):
+                raise ScenarioError(f"{where}: '{name}' has the unit {unit!r}; give a text, '1' for a ratio")
+
+
+def _kind(value: Any) -> str:
+    return "nothing" if value is None else f"an object of type {type(value).__name__}"
 
 
 def aligned(rows: list[dict[str, Any]]) -> str:
-    """Return rows of one kind as aligned columns."""
+    """Return rows with the same keys as aligned columns."""
     if not rows:
         return "(no rows)"
     names = list(rows[0])
@@ -128,39 +221,78 @@ def _cell(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def load_scenario(name: str) -> Scenario:
-    """Load a scenario by its name, or a user's Python file, FMU or SSP by its path."""
-    if name.endswith(".fmu"):
-        from .fmu_scenario import fmu_scenario
+# --------------------------------------------------------------------------- finding scenarios
 
-        return fmu_scenario(Path(name))
-    if name.endswith(".ssp"):
-        from .ssp_scenario import ssp_scenario
 
-        return ssp_scenario(Path(name))
+def scenario_names() -> list[str]:
+    """Return the names of the scenarios of this installation: files and folders that define a study."""
+    package = importlib.import_module("scenarios")
+    found = [m.name for m in pkgutil.iter_modules(package.__path__)]
+    return sorted(n for n in found if _defines_a_study(n))
+
+
+def _defines_a_study(name: str) -> bool:
+    """Tell from the source, without importing it, whether a module defines Study or run."""
+    tree = ast.parse(_source(name))
+    return any(getattr(node, "name", None) in ("Study", "run") for node in tree.body)
+
+
+def _source(name: str) -> str:
+    """Return the source of a scenario's file, or of study.py in its folder; "" if it has none."""
+    try:
+        spec = importlib.util.find_spec(_module_of(name))
+    except ModuleNotFoundError:
+        spec = None
+    return Path(spec.origin).read_text(encoding="utf-8") if spec is not None and spec.origin else ""
+
+
+def _module_of(name: str) -> str:
+    spec = importlib.util.find_spec(f"scenarios.{name}")
+    is_folder = spec is not None and spec.submodule_search_locations is not None
+    return f"scenarios.{name}.study" if is_folder else f"scenarios.{name}"
+
+
+def summary(name: str) -> str:
+    """Return the first line of a scenario's docstring, without importing it."""
+    return (ast.get_docstring(ast.parse(_source(name))) or "").partition("\n")[0]
+
+
+def python_scenario(name: str) -> Scenario:
+    """Return a scenario of this installation by its name, or a user's by the path of its .py file."""
     if name.endswith(".py"):
-        path = Path(name)
-        return Scenario(path.stem, load_file(path))
+        return Scenario(Path(name).stem, load_file(Path(name)))
     if name not in scenario_names():
         raise ScenarioError(f"there is no scenario '{name}'" + did_you_mean(name, scenario_names()))
-    return Scenario(name, importlib.import_module(_module_of(name)))
+    module = _module_of(name)
+    modules = [importlib.import_module(module)]
+    if module.endswith(".study"):
+        table = f"scenarios.{name}.table"
+        modules += [importlib.import_module(table)] if importlib.util.find_spec(table) else []
+    return Scenario(name, *modules)
 
 
 def load_file(path: Path) -> ModuleType:
-    """Load a user's Python file; what it imports from its own folder is found."""
+    """Load a user's Python file; it may import modules of its own folder.
+
+    The module is registered under a name of its own, and its folder is searched last, so
+    that a file named random.py or numpy.py takes no other module's place.
+    """
     if not path.is_file():
-        raise ScenarioError(f"there is no file {path}; give the path of a scenario or one of its names")
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+        raise ScenarioError(f"there is no file {path}; give the path or the name of a scenario")
+    name = f"_file_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ScenarioError(f"{path} cannot be loaded as a Python file")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
-    sys.path.insert(0, str(path.parent.resolve()))
+    sys.modules[name] = module
+    folder = str(path.parent.resolve())
+    if folder not in sys.path:
+        sys.path.append(folder)
     try:
         spec.loader.exec_module(module)
     except CosimError:
         raise
-    except Exception as error:  # whatever the user's file does
+    except Exception as error:  # a user's file may raise anything
         lines = [f.lineno for f in extract_tb(error.__traceback__) if f.filename == spec.origin]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
         raise ScenarioError(f"{path}, line {line}: {type(error).__name__}: {error}") from error
@@ -168,44 +300,21 @@ def load_file(path: Path) -> ModuleType:
 
 
 def find_part(text: str) -> Participant | FMU | type[Participant]:
-    """Find what `file.py:Class`, `module:Class`, `module:instance` or `scenario:participant` names."""
+    """Return the block that `file.py:Class`, `module:Class` or `scenario:participant` names."""
     where, colon, wanted = text.rpartition(":")
     if not colon:
         raise ScenarioError(f"'{text}': write FILE.py:CLASS, module:CLASS or scenario:participant")
-    if where.endswith(".py"):
-        module = load_file(Path(where))
-    elif where in scenario_names():
-        module = importlib.import_module(_module_of(where))
-    else:
-        try:
-            module = importlib.import_module(where)
-        except ModuleNotFoundError as error:
-            raise ScenarioError(
-                f"'{text}': there is no module '{error.name}'; a file is named FILE.py"
-            ) from error
+    if where in scenario_names():
+        return python_scenario(where).participant(wanted)
+    try:
+        module = load_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
+    except ModuleNotFoundError as error:
+        raise ScenarioError(f"'{text}': there is no module '{error.name}'; give a file as FILE.py") from error
     found = getattr(module, wanted, None)
     if isinstance(found, (Participant, FMU)) or (isinstance(found, type) and issubclass(found, Participant)):
         return found
-    if found is None and hasattr(module, "build"):
-        return find_participant(text)
+    if found is None and (hasattr(module, "Study") or hasattr(module, "build")):
+        return Scenario(where, module).participant(wanted)
     classes = {n: v for n, v in vars(module).items() if isinstance(v, type) and issubclass(v, Participant)}
     parts = [n for n, v in classes.items() if not v.__module__.startswith("cosim.")]
     raise ScenarioError(f"{where} has no block '{wanted}'" + did_you_mean(wanted, parts))
-
-
-def find_participant(text: str) -> Participant:
-    """Find the Python object behind `scenario:participant`, as the scenario builds it by default."""
-    name, colon, wanted = text.rpartition(":")
-    if not colon:
-        raise ScenarioError(f"'{text}': write scenario:participant, such as chattering:plant")
-    system = load_scenario(name).function("build")()
-    if wanted not in system.participants:
-        raise WiringError(
-            f"scenario {name} has no participant '{wanted}'" + did_you_mean(wanted, system.participants)
-        )
-    member = system.participants[wanted]
-    source = member if isinstance(member, Participant) else member.source
-    if source is None:
-        raise ScenarioError(f"{text} is an FMU already ({member.path}); copy that file")
-    found: Participant = source
-    return found

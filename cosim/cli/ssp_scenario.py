@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import Any, get_args
+from types import SimpleNamespace
+from typing import Any, ClassVar, get_args
 
 from ..errors import did_you_mean
 from ..result import Result
@@ -15,62 +17,70 @@ from ..system.system import System
 from .scenario import Scenario, ScenarioError, find_part
 
 
-def ssp_scenario(path: Path) -> Scenario:
-    """Return the scenario of an SSP: what is not given is what its default experiment says."""
+@dataclass(frozen=True, kw_only=True)
+class SSPStudy:
+    """Run the system of an SSP file."""
 
-    def package(replace: tuple[str, ...]) -> Package:
-        return read_package(path, replace=dict(_replacement(text) for text in replace))
+    path: ClassVar[Path]  # a subclass for each file sets it
 
-    def build(*, replace: tuple[str, ...] = ()) -> System:
-        return package(replace).system
+    stop: float | None = None
+    """time at which the run stops, s [that of the file]"""
+    step: float | None = None
+    """communication step, s [that of the file]"""
+    start_time: float | None = None
+    """time at which the run starts, s [that of the file, or 0]"""
+    coupling: Coupling | None = None
+    """sampled: inputs held over a step; continuous: stage coupling, all states are integrated together;
+    iterated: plants that drive each other agree at every communication point [that of the file, or
+    sampled]"""
+    solver: Solver | None = None
+    """solver of stage coupling [that of the file, or ode3]"""
+    record: tuple[str, ...] = ()
+    """port to record, such as plant.x; may be repeated [all outputs]"""
+    replace: tuple[str, ...] = ()
+    """NAME=FILE.py:CLASS replaces a component by a Python block; also NAME=module:CLASS and
+    NAME=scenario:participant; ports are matched by name; may be repeated"""
 
-    def run(
-        *,
-        stop: float | None = None,
-        step: float | None = None,
-        start_time: float | None = None,
-        coupling: Coupling | None = None,
-        solver: Solver | None = None,
-        record: tuple[str, ...] = (),
-        replace: tuple[str, ...] = (),
-        progress: Any = None,
-    ) -> Result:
-        """Run a system.
+    def _package(self) -> Package:
+        return read_package(self.path, replace=dict(_replacement(text) for text in self.replace))
 
-        Parameters
-        ----------
-        stop
-            time to stop at, in s [that of the file]
-        step
-            communication step, in s [that of the file]
-        start_time
-            time to start at, in s [that of the file, or 0]
-        coupling
-            sampled: inputs held over a step; continuous: integrated together [that of the file, or sampled]
-        solver
-            of continuous coupling [that of the file, or ode3]
-        record
-            port to record, such as plant.x; may be repeated [all outputs]
-        replace
-            NAME=FILE.py:CLASS puts a Python block in the place of a component; may be repeated.
-            Also NAME=module:CLASS, NAME=scenario:participant; ports are matched by name
-        """
-        found = package(replace)
-        own = found.experiment
+    def build(self) -> System:
+        """Return the system of the file."""
+        return self._package().system
+
+    def run(self, progress: Callable[[int, int], None] | None = None) -> Result:
+        """Run the system; options that are not given are those of the file's default experiment."""
+        package = self._package()
+        own = package.experiment
         return simulate(
-            found.system,
-            step=_needed(path, "step", step, own.step),
-            stop=_needed(path, "stop", stop, own.stop),
-            start=start_time if start_time is not None else own.start or 0.0,
-            coupling=coupling or _known(path, own.coupling, Coupling) or "sampled",
-            solver=solver or _known(path, own.solver, Solver) or "ode3",
-            record=record or None,
+            package.system,
+            step=self._seconds("step", self.step, own.step),
+            stop=self._seconds("stop", self.stop, own.stop),
+            start=self.start_time if self.start_time is not None else own.start or 0.0,
+            coupling=self.coupling or self._known(own.coupling, Coupling) or "sampled",
+            solver=self.solver or self._known(own.solver, Solver) or "ode3",
+            record=self.record or None,
             progress=progress,
         )
 
-    module = ModuleType(path.stem)
-    module.__dict__.update(build=build, run=run)
-    return Scenario(path.stem, module)
+    def _seconds(self, name: str, given: float | None, own: float | None) -> float:
+        value = own if given is None else given
+        if value is None:
+            raise ScenarioError(f"{self.path} states no {name}; give it in seconds, --{name} 0.01")
+        return value
+
+    def _known(self, value: str | None, choices: Any) -> Any:
+        if value is not None and value not in get_args(choices):
+            raise ScenarioError(
+                f"{self.path}: '{value}' is not known" + did_you_mean(value, get_args(choices))
+            )
+        return value
+
+
+def ssp_scenario(path: Path) -> Scenario:
+    """Return the scenario of an SSP file."""
+    own = {"path": path, "__module__": __name__, "__doc__": SSPStudy.__doc__}
+    return Scenario(path.stem, SimpleNamespace(Study=type("Study", (SSPStudy,), own)))
 
 
 def _replacement(text: str) -> tuple[str, Any]:
@@ -78,15 +88,3 @@ def _replacement(text: str) -> tuple[str, Any]:
     if not (name and equals and part):
         raise ScenarioError(f"--replace {text}: write NAME=FILE.py:CLASS, such as control=mine.py:Controller")
     return name, find_part(part)
-
-
-def _needed(path: Path, name: str, given: float | None, own: float | None) -> float:
-    if given is None and own is None:
-        raise ScenarioError(f"{path} does not say its {name}; give it in seconds, --{name} 0.01")
-    return given if given is not None else own  # type: ignore[return-value]
-
-
-def _known(path: Path, value: str | None, choices: Any) -> Any:
-    if value is not None and value not in get_args(choices):
-        raise ScenarioError(f"{path}: '{value}' is not known" + did_you_mean(value, get_args(choices)))
-    return value

@@ -1,1 +1,1 @@
-"""Chapter 4 of the thesis: six cases of chattering in sliding mode control."""
+"""Chapter 4 of the thesis: chattering of sliding mode control in six cases."""

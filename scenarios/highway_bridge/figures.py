@@ -11,11 +11,24 @@ from matplotlib.figure import Figure
 from cosim import Array, Result
 
 from .bridge import EI, M_Y, SEGMENT
-from .criteria import BEARINGS, moments
+from .criteria import BEARINGS, curvatures, moments
+
+
+def figures(result: Result) -> dict[str, Figure]:
+    """Return figures 3.7 to 3.9, hysteresis loops of a bearing and a column, and the yield map."""
+    found = {
+        "figure-3.7-second-sensor": displacements(result, 1, "second"),
+        "figure-3.8-seventh-sensor": displacements(result, 6, "seventh"),
+        "hysteresis": loops(result, curvatures(result)),
+        "yield-map": yield_map(curvatures(result)),
+    }
+    if "control.nodes" in result:
+        found["figure-3.9-nodes"] = nodes(result)
+    return found
 
 
 def displacements(result: Result, sensor: int, name: str) -> Figure:
-    """Displacement at a sensor (0, 1, ...) in x and y, beside the runs made for comparison."""
+    """Return the displacement at a sensor (0, 1, ...) in x and y, beside the runs to compare with."""
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
     compared = [
@@ -38,7 +51,7 @@ def displacements(result: Result, sensor: int, name: str) -> Figure:
 
 
 def nodes(result: Result) -> Figure:
-    """Number of wavelet nodes over time (figure 3.9)."""
+    """Return figure 3.9, the number of wavelet nodes over time."""
     figure = Figure(figsize=(7.0, 3.0), layout="constrained")
     ax: Axes = figure.subplots()
     ax.step(result.time, result["control.nodes"], where="post", linewidth=0.8)
@@ -48,8 +61,8 @@ def nodes(result: Result) -> Figure:
     return figure
 
 
-def loops(result: Result, curvatures: Array) -> Figure:
-    """Force over deformation of the bearing, moment over curvature of the end, that move most."""
+def loops(result: Result, phi: Array) -> Figure:
+    """Return the loops of the bearing and of the column end that move most."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     deformation = result["bridge.deformation"][:, :BEARINGS]
@@ -58,20 +71,20 @@ def loops(result: Result, curvatures: Array) -> Figure:
     left.set_xlabel("deformation (mm)")
     left.set_ylabel("force (kN)")
     left.set_title(f"bearing {i // 2 + 1}, {'xy'[i % 2]}")
-    j = int(np.abs(curvatures).max(axis=0).argmax())
-    right.plot(1e3 * curvatures[:, j], 1e-6 * moments(result)[:, j], linewidth=0.6)
+    j = int(np.abs(phi).max(axis=0).argmax())
+    right.plot(1e3 * phi[:, j], 1e-6 * moments(result)[:, j], linewidth=0.6)
     right.set_xlabel("curvature (1/km)")
-    right.set_ylabel("moment (MN m)")
-    right.set_title(f"column {j // (curvatures.shape[1] // 2) + 1}")
+    right.set_ylabel("moment (MN·m)")
+    right.set_title(f"column {j // (phi.shape[1] // 2) + 1}")
     for ax in (left, right):
         ax.grid(alpha=0.3)
     return figure
 
 
-def yield_map(curvatures: Array) -> Figure:
-    """Largest curvature over that at yield, along both columns, bending in y and in x."""
+def yield_map(phi: Array) -> Figure:
+    """Return the largest curvature over that at yield, along both columns, bending in y and in x."""
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    ratio = np.abs(curvatures).max(axis=0) * EI / M_Y
+    ratio = np.abs(phi).max(axis=0) * EI / M_Y
     per_column = len(ratio) // 2
     for c, ax in enumerate(figure.subplots(1, 2, sharex=True, sharey=True)):
         segments = ratio[c * per_column : (c + 1) * per_column].reshape(-1, 2, 2)  # segment, plane, end

@@ -1,4 +1,4 @@
-"""The 76-story building of chapter 2 as a calibrated cantilever (thesis.txt, 2.4.1).
+"""The 76-story building of chapter 2 as a calibrated cantilever (thesis, 2.4.1).
 
 A vertical Bernoulli-Euler cantilever with rigid floors: one bending stiffness and
 one mass per metre for each of four sections of the tower; the mass is lumped at the
@@ -11,12 +11,11 @@ Damping is classical: 1 % of critical in modes 1 to 5, above them proportional t
 frequency (stiffness-proportional, so that the highest modes are overdamped, as in the
 benchmark of Yang, Agrawal, Samali and Wu, 2004).
 
-The nine numbers below were found by `scenarios/_fit_tall_building.py` from the
-benchmark's first five frequencies, modal masses and shapes; the story heights are
-those of the benchmark.
+The nine numbers below were found by calibrate.py from the benchmark's first five
+frequencies, modal masses and shapes; the story heights are those of the benchmark.
 
-Units: m, kg, N, s. The printed mass of 153,000 t is not what the benchmark's matrix
-adds up to (1' M 1 = 210,863 t); the fit follows the matrix.
+Units: m, kg, N, s. The benchmark's mass matrix adds up to 210,863 t (1' M 1), not to the
+printed 153,000 t; the fit follows the matrix.
 """
 
 from __future__ import annotations
@@ -33,10 +32,10 @@ STORY_HEIGHTS: Array = np.concatenate([[10.0], [4.5] * 2, [3.9] * 35, [4.5] * 2,
 """Story heights from the ground up, m: 76 stories, 306.1 m."""
 
 SECTION_TOPS = (19, 38, 57, 76)
-"""Last story of each section of the tower (columns and core step in there)."""
+"""Last story of each section of the tower, above which columns and core are smaller."""
 
 BENDING_STIFFNESS: tuple[float, ...] = (4.219e14, 3.378e14, 2.003e14, 1.171e14)
-"""EI of each section, N m2."""
+"""EI of each section, N*m^2."""
 
 MASS_PER_METRE: tuple[float, ...] = (910.9e3, 785.8e3, 605.5e3, 469.9e3)
 """Mass of each section, kg/m."""
@@ -48,7 +47,7 @@ ROOF_MASS = 747.1e3
 def cantilever_stiffness(heights: Array, bending_stiffness: Array) -> Array:
     """Lateral stiffness (n, n), N/m, of a cantilever with massless floor rotations.
 
-    heights (n,) m and bending_stiffness (n,) N m2 by story. Hermite beam elements,
+    heights (n,) m and bending_stiffness (n,) N*m^2 by story. Hermite beam elements,
     rotations condensed statically.
     """
     n = len(heights)

@@ -1,23 +1,23 @@
-"""Damper and building as two FMUs, coupled by motion and force: what the coupling costs.
+"""Damper and building as two FMUs that exchange motion and force: the error of the coupling.
 
     damper.x_top, damper.v_top <- building.x[76], building.v[76]
     building.top               <- damper.reaction
 
-Under sampled coupling each side holds what it got over the step, and the error falls with
-the step, first order; under iterated coupling both agree at every communication point, and
-it falls with the square of the step. The one plant `DampedTower` is exact for held loads and
-is the reference.
+Under sampled coupling each side holds its inputs over the step, and the error falls in
+proportion to the step. Under iterated coupling both sides agree at every communication
+point, and the error falls with the square of the step. The single plant `DampedTower` is
+exact for held loads and serves as reference.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from cosim import Coupling, Result, System, simulate
+from cosim import Result, System, simulate
 from fmus.export import as_fmu
 from fmus.loads.wind import FloorLoad
 from fmus.plants.damped_tower import DampedTower
@@ -25,20 +25,22 @@ from fmus.plants.modal_structure import ModalStructure
 from fmus.plants.tuned_mass_damper import TunedMassDamper
 
 from .building import STORY_HEIGHTS, Damper
+from .plant import building, load
 
+Coupling = Literal["sampled", "iterated"]
 COUPLINGS: tuple[Coupling, ...] = ("sampled", "iterated")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)
 SPAN = 60.0
 
 
-def coupling_errors(common: dict[str, Any], steps: tuple[float, ...] = STEPS) -> list[dict[str, Any]]:
-    """Peak errors of x_76 and x_m over the peak response, by step and coupling."""
-    from .study import building, load
-
-    structure = building(common["data"])
-    table, dt = load(common["wind"], common["seed"], common["duration"], structure.dof)
-    top = [len(STORY_HEIGHTS) if common["data"] is None else structure.dof]
-    span = min(SPAN, common["duration"])
+def coupling_errors(
+    data: str | None, wind: str | None, seed: int, duration: float, steps: tuple[float, ...] = STEPS
+) -> list[dict[str, Any]]:
+    """Return the peak errors of x_76 and x_m over the peak response, by step and coupling."""
+    structure = building(data)
+    table, dt = load(wind, seed, duration, structure.dof)
+    top = [len(STORY_HEIGHTS) if data is None else structure.dof]
+    span = min(SPAN, duration)
     rows: list[dict[str, Any]] = []
     for step in steps:
         one = _run({"tower": DampedTower.build(structure, top, **asdict(Damper()))}, table, dt, step, span)
@@ -65,7 +67,7 @@ def coupling_errors(common: dict[str, Any], steps: tuple[float, ...] = STEPS) ->
 def _run(
     plants: dict[str, Any], table: Any, dt: float, step: float, span: float, coupling: Coupling = "sampled"
 ) -> Result:
-    """One run; the load is held over 20 ms in every case, so that all steps see the same one."""
+    """Run the plants; the load is held over 20 ms, so that it is the same for all steps."""
     system = System({"load": FloorLoad(table=table, dt=dt, sample_period=STEPS[0])})
     for name, plant in plants.items():
         system.add(name, as_fmu(plant))

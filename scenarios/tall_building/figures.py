@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from cosim import Array
 
 from .building import STORY_HEIGHTS
-from .criteria import FLOORS
-
-if TYPE_CHECKING:
-    from .study import TowerResult
+from .criteria import FLOORS, TowerResult
 
 _WIND_FLOORS = (30, 50, 70, 75)
 
 
 def figures(result: TowerResult) -> dict[str, Figure]:
-    """Wind on four floors; response of floor 75 and force; profiles if the run has them."""
+    """Return wind on four floors, response of floor 75 and force, and profiles if the run has them."""
     found = {}
     if "load.w" in result:
         found["wind"] = wind(result.time, result["load.w"])
@@ -31,7 +26,7 @@ def figures(result: TowerResult) -> dict[str, Figure]:
 
 
 def wind(time: Array, forces: Array) -> Figure:
-    """Figure 2.3: wind excitation of floors 30, 50, 70 and 75."""
+    """Return figure 2.3: wind excitation of floors 30, 50, 70 and 75."""
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     for axes, floor in zip(figure.subplots(4, 1, sharex=True, sharey=True), _WIND_FLOORS, strict=True):
         axes.plot(time, forces[:, floor - 1] / 1e3, linewidth=0.6)
@@ -44,7 +39,7 @@ def wind(time: Array, forces: Array) -> Figure:
 
 
 def response(result: TowerResult) -> Figure:
-    """Figures 2.5 and 2.6: displacement and acceleration of floor 75, and the control force."""
+    """Return figures 2.5 and 2.6: displacement and acceleration of floor 75, and the control force."""
     row = FLOORS.index(75)
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     x, a, u = figure.subplots(3, 1, sharex=True)
@@ -64,7 +59,7 @@ def response(result: TowerResult) -> Figure:
 
 
 def profile(result: TowerResult) -> Figure:
-    """RMS and peak of displacement and acceleration by floor, over the height."""
+    """Return RMS and peak of displacement and acceleration by floor, over the height."""
     height = np.cumsum(STORY_HEIGHTS)
     figure = Figure(figsize=(8.0, 8.0), layout="constrained")
     grid = figure.subplots(2, 2, sharey=True)

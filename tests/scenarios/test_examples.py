@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import FMUError, Result, simulate
+from cosim import Result, simulate
 from cosim.cli.app import main
 from fmus.export import export
 from scenarios import building_in_fmpy, controller_in_ssp, external_plant
@@ -40,7 +40,7 @@ def test_a_controller_on_somebody_elses_plant(
     assert f"FMI {version}" in text
     assert any(line.split()[:4] == ["m", "Real" if version == "2.0" else "Float64", "parameter", "-"]
                for line in text.splitlines())  # fmt: skip
-    result = external_plant.run(fmu=path, start=("m=4.0",), damping=0.002, stop=5.0)
+    result = external_plant.Study(fmu=path, start={"m": 4.0}, damping=0.002, stop=5.0).run()
     x, v, xs = 1.0, 0.0, []
     for _ in range(501):
         xs.append(x)
@@ -50,18 +50,25 @@ def test_a_controller_on_somebody_elses_plant(
     assert np.array_equal(result["plant.x"], xs)
 
 
-@pytest.mark.parametrize(
-    ("start", "words"),
-    [("k=abc", "--start k=abc: 'abc' is no value"), ("k", "write name=value"), ("kk=1", "did you mean 'k'")],
-)
-def test_start_values_of_the_plant_that_are_none(start: str, words: str) -> None:
-    with pytest.raises(FMUError, match=words):
-        external_plant.build(start=(start,))
+def test_start_values_from_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A number, a number with a unit, and errors with their remedy."""
+    monkeypatch.chdir(tmp_path)
+    run = ["run", "external_plant", "--stop", "1", "--no-figures"]
+    for value in ("2.0", "0.002t"):
+        main([*run, "--start.m", value, "--out", value])
+    one, other = (Result.load(tmp_path / value / "result.npz") for value in ("2.0", "0.002t"))
+    assert np.array_equal(one["plant.x"], other["plant.x"])
+    for wrong, words in (("--start.kk", "did you mean 'k'"), ("--strat", "Did you mean --start")):
+        with pytest.raises(SystemExit):
+            main([*run, wrong, "1.0"])
+        assert words in capsys.readouterr().err
 
 
 def test_units_of_the_plant_are_heeded() -> None:
     """0.4e-3 kN s/m are 0.4 N s/m, limited to 8 N: the energy says what force the plant got, in N."""
-    result = external_plant.run(stop=10.0)
+    result = external_plant.Study(stop=10.0).run()
     F, v = result["control.F"], result["plant.v"]
     assert np.array_equal(F, np.clip(-0.4e-3 * v, -8e-3, 8e-3))
     assert result.units["control.F"] == "kN"

@@ -42,6 +42,36 @@ def run(*, b: float = 1.5, stop: float = 2.0, progress=None):
     return simulate(build(b=b), step=0.01, stop=stop, progress=progress)
 '''
 
+STUDY = '''
+from dataclasses import dataclass
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """Brake a mass."""
+    b: float = 1.5
+    """damping constant"""
+    stop: float = 2.0
+    """time at which the run stops, s"""
+
+    def build(self) -> System:
+        brake = Brake(b=self.b)
+        return System({"mass": Mass(), "brake": brake}, [("mass.v", "brake.v"), ("brake.F", "mass.F")])
+
+    def run(self, progress=None):
+        return simulate(self.build(), step=0.01, stop=self.stop, progress=progress)
+
+    def metrics(self, result):
+        return {"final speed": (result["mass.v"][-1], "m/s")}
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """One row."""
+    scale: float = 2.0
+
+    def rows(self):
+        return [{"b": 1.0, "double": self.scale}]
+'''
+
 
 @pytest.fixture
 def scenario(tmp_path):
@@ -91,9 +121,114 @@ def test_options_come_from_the_signature(scenario, capsys):
     assert "progress" not in text
 
 
+def test_a_study_class_gives_the_options_of_its_fields(tmp_path, capsys):
+    """The class form of the same scenario: the same options, numbers and record on disk."""
+    functions = SCENARIO[SCENARIO.index("def build") :]
+    path = tmp_path / "studied.py"
+    path.write_text(SCENARIO.replace(functions, STUDY))
+    assert call("run", path, "--b", 3.0, "--out", tmp_path / "out") == 0
+    assert "final speed" in capsys.readouterr().out
+    kept = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert kept["options"] == {"b": 3.0, "stop": 2.0}
+    # v_k = 2 (1 - h b / m)^k: the force is held over a step and the derivative is constant
+    final = kept["metrics"]["final speed"]
+    assert final["value"] == pytest.approx(2.0 * (1 - 0.01) ** 200, rel=1e-12)  # 200 roundings
+    assert final["unit"] == "m/s"
+    assert call("run", path, "--help") == 0
+    text = capsys.readouterr().out
+    assert "damping constant" in text
+    assert "Brake a mass." in text
+    assert call("table", path, "--json", "--scale", 3.0) == 0
+    assert json.loads(capsys.readouterr().out) == [{"b": 1.0, "double": 3.0}]
+    assert call("table", path) == 0
+    assert "double" in capsys.readouterr().out
+    assert call("export", f"{path}:mass", "--out", tmp_path / "mass.fmu") == 0
+
+
 def test_list_names_the_scenarios(capsys):
+    """Every study is listed; modules that only help a study are not."""
     assert call("list") == 0
-    assert "chattering" in capsys.readouterr().out
+    names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert {"chattering", "tall_building", "highway_bridge", "external_plant"} <= set(names)
+    assert not {"figures", "measurement"} & set(names)
+
+
+def test_a_reader_that_stops_reading_ends_the_list_without_a_traceback():
+    """`cosim list | true`: the pipe is closed before the command writes to it."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = "from cosim.cli.app import main; main(['list'])"
+    with os.fdopen(writer, "w") as pipe:
+        done = subprocess.run(
+            [sys.executable, "-c", code], stdout=pipe, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr == ""
+
+
+METRICS = "def metrics(result):\n    return {}\n\ndef run("
+NOT_A_SCENARIO = [
+    ("return simulate(", "simulate(", "run() returned nothing; return the Result of simulate()"),
+    ("def run(", METRICS.format("{'v': 1.0}"), "'v' is 1.0; give (value, unit)"),
+    ("def run(", METRICS.format("{'v': (1.0, None)}"), "'v' has the unit None; give a text"),
+    ("def run(", METRICS.format("[1.0]"), "type list; it must return {name: (value, unit)}"),
+    ("def run(", "def other(", "defines neither a class Study nor a function run()"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), NOT_A_SCENARIO)
+def test_a_scenario_that_returns_something_else_is_refused(tmp_path, capsys, old, new, words):
+    path = tmp_path / "wrong.py"
+    path.write_text(SCENARIO.replace(old, new))
+    assert words in refused(capsys, "run", path, "--out", tmp_path / "out")
+
+
+@pytest.mark.parametrize("name", ["random", "json", "numpy"])
+def test_a_file_named_like_a_module_takes_no_modules_place(tmp_path, name):
+    """The file imports the module that it is named after; later imports find the module, too."""
+    path = tmp_path / f"{name}.py"
+    path.write_text(
+        SCENARIO.replace("from cosim", f"import {name}\nassert not hasattr({name}, 'Brake')\nfrom cosim")
+    )
+    code = (
+        "import sys\nfrom cosim.cli.app import main\n"
+        f"main(['run', {str(path)!r}, '--out', {str(tmp_path / 'out')!r}])\n"
+        f"sys.modules.pop('colorsys', None); import {name}\nassert not hasattr({name}, 'Brake')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_an_output_folder_is_tried_before_the_run(scenario, tmp_path, capsys, monkeypatch):
+    """--out names a file, or lies below one: refused, and the scenario has not run."""
+    (tmp_path / "taken").write_text("")
+    monkeypatch.setattr("cosim.cli.app.warnings.catch_warnings", None)  # entered only to run a study
+    for out in (tmp_path / "taken", tmp_path / "taken" / "below", tmp_path / ("x" * 300)):
+        assert "name a folder that can be written to" in refused(capsys, "run", scenario, "--out", out)
+
+
+def test_files_of_a_run_replace_the_old_ones_whole(scenario, tmp_path, capsys, monkeypatch):
+    """A run that fails while it writes result.npz leaves the file of the run before, and no other file."""
+    assert call("run", scenario, "--out", tmp_path / "out") == 0
+    before = (tmp_path / "out" / "result.npz").read_bytes()
+
+    def full(self, path):
+        path.write_bytes(before[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("cosim.result.Result.save", full)
+    assert "No space left" in refused(capsys, "run", scenario, "--b", 3.0, "--out", tmp_path / "out")
+    assert (tmp_path / "out" / "result.npz").read_bytes() == before
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["metrics.json", "result.npz"]
+
+
+def test_metrics_have_null_where_a_number_is_not_finite(tmp_path):
+    path = tmp_path / "endless.py"
+    path.write_text(SCENARIO + "\ndef metrics(result):\n    return {'v': (float('inf'), 'm/s')}\n")
+    assert call("run", path, "--out", tmp_path / "out") == 0
+    text = (tmp_path / "out" / "metrics.json").read_text()
+    assert "Infinity" not in text
+    assert json.loads(text)["metrics"]["v"] == {"value": None, "unit": "m/s"}
 
 
 def test_table_as_json_is_a_list_of_rows(capsys):
@@ -120,7 +255,7 @@ def test_export_and_inspect(scenario, tmp_path, capsys):
     text = capsys.readouterr().out
     assert "Co-Simulation" in text
     line = next(line for line in text.splitlines() if line.startswith("v "))
-    assert line.split()[:5] == ["v", "Real", "output", "m/s", "2.0"]
+    assert line.split()[:9] == ["v", "Real", "output", "m/s", "2.0", "-", "continuous", "-", "-"]
 
 
 @pytest.mark.parametrize(
@@ -131,7 +266,7 @@ def test_export_and_inspect(scenario, tmp_path, capsys):
         (("run", "chattering", "--cas", "2"), "Did you mean"),
         (("run", "chattering", "--case", "9"), "Choose from"),
         (("table", "nothing"), "there is no scenario 'nothing'"),
-        (("export", "chattering", "--out", "chattering.zip"), "leaves as an .ssp"),
+        (("export", "chattering", "--out", "chattering.zip"), "is exported as an .ssp"),
         (("export", "chattering:plnt"), "did you mean 'plant'"),
         (("export", "chattering:plant", "--platform", "x86_64-linx"), "x86_64-linux"),
         (("export", "chattering:plant", "--fmi-version", "1.0"), "2.0"),
@@ -188,6 +323,10 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
     )
     assert done.returncode == 130, done.stderr
     assert "Traceback" not in done.stderr
+    first, kept = done.stderr.splitlines()[-2:]
+    assert first == "interrupted"
+    assert kept.startswith("kept: ")
+    assert f"{tmp_path / 'out'}: metrics.json, result.npz" in kept
     with np.load(tmp_path / "out" / "result.npz") as data:
         assert 1 < len(data["time"]) < 400_000_000
 

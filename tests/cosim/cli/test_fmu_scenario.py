@@ -29,7 +29,7 @@ from cosim import (
 )
 from cosim.blocks import TableSource
 from cosim.cli.app import main
-from cosim.cli.fmu_scenario import fmu_scenario
+from cosim.cli.fmu_scenario import fmu_study
 from cosim.cli.input_table import connect_inputs
 from fmus.export import DefaultExperiment, export
 from tests.cosim.fmi.ball import ball
@@ -88,7 +88,7 @@ def test_inputs_from_a_file_are_those_of_a_source(folder, tmp_path):
     """An element and an array: the run of the same table as a block, bit for bit."""
     (tmp_path / "in.csv").write_text('time,"u[2]"\n0,0\n0.45,1.5\n0.45,-1\n\n0.9,0.5\n')
     options = {"stop": 1.0, "step": 0.05, "record": ("a", "u")}
-    found = fmu_scenario(folder / "chain.fmu").run(input=tmp_path / "in.csv", **options)
+    found = fmu_study(folder / "chain.fmu")(input=tmp_path / "in.csv", **options).run()
     source = TableSource([0.0, 0.45, 0.45, 0.9], [0.0, 1.5, -1.0, 0.5])
     system = System({"chain": FMU(folder / "chain.fmu"), "s": source}, [("s.y", "chain.u[2]")])
     wanted = simulate(system, step=0.05, stop=1.0, record=["chain.a", "chain.u"])
@@ -96,7 +96,7 @@ def test_inputs_from_a_file_are_those_of_a_source(folder, tmp_path):
         assert np.array_equal(found[name], wanted[name])
     assert np.ptp(found["chain.u"][:, 1]) > 2.0
     (tmp_path / "array.csv").write_text("time, u\n0, 0 0\n0.45, 0 1.5\n0.45, 0 -1\n0.9, 0 0.5\n")
-    again = fmu_scenario(folder / "chain.fmu").run(input=tmp_path / "array.csv", **options)
+    again = fmu_study(folder / "chain.fmu")(input=tmp_path / "array.csv", **options).run()
     assert np.array_equal(found["chain.a"], again["chain.a"])
 
 
@@ -104,9 +104,9 @@ def test_discrete_inputs_are_held(folder, tmp_path):
     """Booleans by word, enumerations by number, an alias by its other name."""
     text = "time,b_in,e_in,i_in,r_other\n0,true,1,-5,0\n0.5,FALSE,2,7,1\n"
     (tmp_path / "in.csv").write_text(text)
-    scenario = fmu_scenario(folder / "probe.fmu")
+    study = fmu_study(folder / "probe.fmu")
     record = ("b_out", "e_out", "i_out", "r_out")
-    result = scenario.run(input=tmp_path / "in.csv", stop=1.0, step=0.25, record=record)
+    result = study(input=tmp_path / "in.csv", stop=1.0, step=0.25, record=record).run()
     # row of the file that is latched at t_k-1, with which y_k is computed; at t_0 what it starts with
     late = [0, 0, 0, 1, 1]
     for name, values in (("b_out", (0, 1)), ("e_out", (1, 2)), ("i_out", (-4, 8))):
@@ -125,12 +125,15 @@ def test_discrete_inputs_are_held(folder, tmp_path):
         ('time,"u[3]"\n0,1\n', r"outside shape \(2,\)"),
         ("time,u\n0,1 2\n1\n", r"in\.csv:3: 1 cells, and the header has 2"),
         ("time,u\n0,1 2\n1,1\n", r"in\.csv:3: u takes 2 numbers"),
-        ("time,u\n0,1 x\n", r"in\.csv:2: u is 'x', which is no finite number"),
-        ("time,u\n0,1 nan\n", "which is no finite number"),
+        ("time,u\n0,1 x\n", r"in\.csv:2: u is 'x', which is not a finite number"),
+        ("time,u\n0,1 nan\n", "which is not a finite number"),
         ("time,u\n1,1 1\n0,1 1\n", r"in\.csv:3: time 0 s comes after 1 s"),
         ("time,u,u\n0,1 1,1 1\n", "there are two columns u"),
-        ('time,"u\n0,1 1\n', "is no CSV file"),
-        ("time,u\n0,0 9007199254740993\n", r"in\.csv:2: u is 9007199254740993, which is above 2\^53"),
+        ('time,"u\n0,1 1\n', "is not a CSV file"),
+        (
+            "time,u\n0,0 9007199254740993\n",
+            r"in\.csv:2: u is 9007199254740993, which a float above 2\^53 cannot represent",
+        ),
     ],
 )
 def test_files_that_are_no_inputs(folder, tmp_path, text, words):
@@ -172,7 +175,7 @@ def test_a_missing_or_binary_file_and_a_text_input(folder, tmp_path):
     with pytest.raises(RecordError, match="cannot be read"):
         connect_inputs(system, "p", tmp_path / "missing.csv")
     (tmp_path / "in.csv").write_bytes(bytes(range(128, 200)))
-    with pytest.raises(RecordError, match="no text in UTF-8"):
+    with pytest.raises(RecordError, match="not text in UTF-8"):
         connect_inputs(system, "p", tmp_path / "in.csv")
 
 
@@ -209,11 +212,11 @@ class Mixer(LinearContinuous):
 
 def test_a_matrix_is_given_row_by_row(tmp_path):
     path = export(Mixer(), tmp_path / "mixer.fmu", fmi_version="3.0")
-    run = fmu_scenario(path).run
-    result = run(stop=1.0, step=0.5, start=("A=1 2 3, 4 5 6", "u=1 10 100"), record=("x",))
+    study = fmu_study(path)
+    result = study(stop=1.0, step=0.5, start=("A=1 2 3, 4 5 6", "u=1 10 100"), record=("x",)).run()
     assert result["mixer.x"][-1] == pytest.approx([321.0, 654.0], rel=1e-15)
     with pytest.raises(FMUError, match=r"A = \[1\.0, 2\.0\] is no Float64 of shape \(2, 3\)"):
-        run(stop=1.0, step=0.5, start=("A=1 2",))
+        study(stop=1.0, step=0.5, start=("A=1 2",)).run()
 
 
 def test_scheduled_execution_is_refused(tmp_path, capsys):
@@ -263,7 +266,7 @@ def test_a_crash_of_an_isolated_fmu_keeps_what_was_computed(tmp_path, monkeypatc
         (["--stop", "2"], "ball.fmu has no default step; give --step, in s, such as 0.002"),
         (["--stop", "2", "--step", "0.1", "--start", "ee=1"], "no variable 'ee'; did you mean 'e'"),
         (["--stop", "2", "--step", "0.1", "--start", "e"], "write name=value"),
-        (["--stop", "2", "--step", "0.1", "--start", "e=soft"], "'soft' is no value of type Real"),
+        (["--stop", "2", "--step", "0.1", "--start", "e=soft"], "'soft' is not a value of type Real"),
         (["--stop", "2", "--step", "0.1", "--record", "hh"], "did you mean 'h'"),
     ],
 )

@@ -137,7 +137,7 @@ def test_a_file_that_does_not_say_how_it_is_run(folder, capsys):
     (folder / "bare.py").write_text(text.replace("step=STEP, stop=STOP", "step=1.0, stop=1.0"))
     assert call("export", "bare.py") == 0
     assert call("run", "bare.ssp", "--step", 0.01) == 2
-    assert "bare.ssp does not say its stop; give it in seconds, --stop" in capsys.readouterr().err
+    assert "bare.ssp states no stop; give it in seconds, --stop" in capsys.readouterr().err
     assert call("export", "bare.py", "--step", 0.01, "--stop", 0.5) == 0
     assert call("run", "bare.ssp") == 0
 
@@ -157,4 +157,4 @@ def test_a_system_as_one_fmu(folder, capsys):
 
 def test_an_export_to_something_else_is_refused(folder, capsys):
     assert call("export", "braking.py", "--out", "loop.zip") == 2
-    assert "a system leaves as an .ssp" in capsys.readouterr().err
+    assert "a system is exported as an .ssp" in capsys.readouterr().err

@@ -17,7 +17,7 @@ from cosim import FMU, Continuous, CosimError, Input, Output, State, System, sim
 from fmus.export import ExportError, export
 from fmus.packaging.container import export_container
 from fmus.plants.oscillator import Oscillator
-from scenarios.chattering import study as chattering
+from scenarios.chattering.study import Study
 from tests.fmus.packaging.ssp_parts import Damper, Frame, Watch
 from tests.fmus.packaging.test_ssp_elsewhere import Brake, at_rest, frame
 
@@ -60,7 +60,7 @@ def late() -> System:
 
 
 def case_6() -> System:
-    return chattering.build(case=6)
+    return Study(case=6).build()
 
 
 @pytest.mark.parametrize(

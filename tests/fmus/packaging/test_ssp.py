@@ -16,7 +16,7 @@ from cosim.ssp.format import NAMESPACES, SSPError
 from cosim.ssp.reader import Experiment, read_package
 from fmus.export import export
 from fmus.packaging.ssp import export_ssp
-from scenarios.chattering.study import build
+from scenarios.chattering.study import Study
 from tests.fmus.packaging.ssp_parts import Damper, Frame, Watch, loop, validated
 
 H, STOP = 0.01, 2.0
@@ -51,7 +51,7 @@ def test_the_same_bits_after_the_way_through_a_file(tmp_path, version):
 
 def test_a_scenario_with_all_its_blocks(tmp_path):
     """Chapter 4, case 6: noise, earthquake, sensor, switching control, which amplifies a lost bit."""
-    system = build(case=6)
+    system = Study(case=6).build()
     path = export_ssp(system, tmp_path / "chattering.ssp")
     validated(path)
     result = same_runs(system, read_ssp(path))

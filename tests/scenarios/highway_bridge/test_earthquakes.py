@@ -65,7 +65,7 @@ def test_packages_agree_with_the_benchmarks_peaks():
 
 
 def test_unknown_and_missing_records_say_what_to_do(tmp_path):
-    with pytest.raises(RecordError, match="did you mean 'kobe'"):
+    with pytest.raises(RecordError, match="choose from n-palm-springs, chi-chi"):
         earthquake("kobee")
     with pytest.raises(RecordError, match=r"Npalmspr\.csv"):
         earthquake("n-palm-springs", tmp_path)
