@@ -51,14 +51,14 @@ def cache_directory() -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CosimError(
-            f"compiled code cannot be kept in {path}: {error.strerror}; "
-            "name a folder that can be written in the environment variable STRUCTCOSIM_CACHE"
+            f"compiled code cannot be stored in {path}: {error.strerror}; "
+            "name a writable folder in the environment variable STRUCTCOSIM_CACHE"
         ) from error
     return path
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that another process sees all of it or nothing."""
+    """Write a file so that another process sees either all of it or none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent)
     try:
@@ -74,7 +74,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def _is_ours(value: Any) -> bool:
-    """Tell whether a global of a kernel is a Python function that has to be compiled with it."""
+    """Tell whether a global of a kernel is a Python function that must be compiled with it."""
     return isinstance(value, types.FunctionType) and not _is_library(value.__module__ or "")
 
 
@@ -89,7 +89,7 @@ def _names(code: types.CodeType) -> set[str]:
 
 
 def _describe(value: Any, seen: dict[int, int]) -> str:
-    """Return a text that changes when what a kernel computes with `value` can change."""
+    """Return a text that differs whenever a kernel could compute something else with `value`."""
     if isinstance(value, (tuple, list)):
         return f"{type(value).__name__}({[_describe(item, seen) for item in value]})"
     if isinstance(value, types.CodeType):
@@ -174,7 +174,7 @@ def _without_python(dispatcher: Any) -> Any:
         return flags
 
     def keep(compiled: Any) -> None:
-        compiled = compiled._replace(entry_point=object())  # what callers look the code up by
+        compiled = compiled._replace(entry_point=object())  # by which callers look up the code
         dispatcher.targetctx.insert_user_function(compiled.entry_point, compiled.fndesc, [compiled.library])
         dispatcher.overloads[tuple(compiled.signature.args)] = compiled
 
@@ -298,12 +298,12 @@ def lower(participant: Participant) -> str:
 def _lower_kernels(participant: Participant) -> str:
     import numba
 
-    record = numba.from_dtype(participant.dtype)
+    storage = numba.from_dtype(participant.dtype)
     memo: dict[Any, Any] = {}
     linked = None
     for name, kernel in participant.kernels.items():
         times = kernel.__code__.co_argcount - 1
-        signature = (record, *([numba.float64] * times))
+        signature = (storage, *([numba.float64] * times))
         dispatcher = _jitted(kernel, participant.kernels, memo)
         try:
             text = _lower(f"kernel_{name}", dispatcher, signature)

@@ -24,7 +24,7 @@ from .instance import Setting
 
 
 class CompiledKernelsWarning(UserWarning):
-    """A block runs as a Python callback because Numba cannot compile it."""
+    """A participant runs as Python callbacks because Numba cannot compile its kernels."""
 
 
 class KernelInstance:
@@ -51,7 +51,7 @@ class KernelInstance:
             except CompilationError as error:
                 warnings.warn(
                     f"{name} runs as a Python callback, about 50 times slower: {error}. "
-                    f"Set compiled = False in {type(participant).__name__} to accept that silently",
+                    f"Set compiled = False in {type(participant).__name__} to accept that",
                     CompiledKernelsWarning,
                     stacklevel=4,
                 )
