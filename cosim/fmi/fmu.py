@@ -23,6 +23,7 @@ from ..core.participant import Participant, rate
 from ..core.port import Direction, Port
 from ..core.tableaus import TABLEAUS
 from ..errors import FMUError, did_you_mean
+from ..loop.instance import Instance, Setting
 from ..loop.numbers import Number
 from .clocks import clocks_of
 from .file.archive import Archive
@@ -159,7 +160,7 @@ class FMU:
                 )
         self.start_values()
 
-    def instance(self, name: str, setting: Any) -> Any:
+    def instance(self, name: str, setting: Setting) -> Instance:
         """Return a running instance (cosim/run/instance.py); refuse a setting that the FMU does not fit."""
         from .instance.making import instance_of
 

@@ -4,8 +4,7 @@ An instance gives the operations that move it; the couplings put them in order, 
 runs them again and again. It is used in this order:
 
 1. It is made from its component and a `Setting`. It then has addresses for the floats of the
-   ports that the setting names, and refuses, with a remedy, what it cannot do under the
-   coupling of the run.
+   ports that the setting names. It refuses, with a remedy, a coupling that it cannot serve.
 2. `start` initializes it at t_0. The operations are asked for before or after that, once.
 3. At a communication point t_k, `read` and `read_texts` bring the outputs up to date: the
    result of the inputs that were held over [t_{k-1}, t_k].

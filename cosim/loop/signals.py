@@ -1,7 +1,7 @@
 """Signals that end a run early: exceptions of callbacks, requests to end, Ctrl-C, operations that fail.
 
-A C loop carries no exception. A callback leaves it here and returns status 1; the master
-raises it, with what was computed until then, once the loop is back.
+The compiled loop cannot carry an exception. A callback leaves it here and returns status 1;
+the simulation raises it, with the result until then, once the loop has returned.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class EndOfRun(Exception):
 
 
 class RunSignals:
-    """Exceptions and requests to end that callbacks leave for the master, and Ctrl-C."""
+    """Exceptions and requests to end that callbacks leave for the simulation, and Ctrl-C."""
 
     def __init__(self) -> None:
         self.exception: BaseException | None = None
@@ -66,11 +66,12 @@ class RunSignals:
         self.set_end(self.end or text)
 
     def error(self) -> SimulationError:
-        """Return the exception that was left as an error of the run."""
-        what = f"{type(self.exception).__name__}: {self.exception}"
-        asked = isinstance(self.exception, SimulationError)  # place and time are in it
-        failed = f"{self.participant} failed at t = {self.time:g} s: {what}"
-        error = SimulationError(str(self.exception) if asked else failed)
+        """Return the exception that a callback left as an error of the run."""
+        text = str(self.exception)
+        if not isinstance(self.exception, SimulationError):  # which says place and time itself
+            kind = type(self.exception).__name__
+            text = f"{self.participant} failed at t = {self.time:g} s: {kind}: {text}"
+        error = SimulationError(text)
         error.__cause__ = self.exception
         return error
 
@@ -98,8 +99,8 @@ class RunSignals:
 def ctrl_c(signals: RunSignals) -> Iterator[None]:
     """Note Ctrl-C, to be acted upon between chunks or after a callback.
 
-    Raised at any moment it may strike while Python enters a callback from C, where the
-    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
+    KeyboardInterrupt at any moment might be raised while Python enters a callback from C, where
+    it is printed and lost, and the run goes on. A second Ctrl-C is raised at once.
     """
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

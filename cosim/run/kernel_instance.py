@@ -47,7 +47,7 @@ class KernelInstance:
             except CompilationError as error:
                 warnings.warn(
                     f"{name} runs as a Python callback, about 50 times slower: {error}. "
-                    f"Set compiled = False in {type(participant).__name__} to accept that silently",
+                    f"Set compiled = False in {type(participant).__name__} to accept that",
                     CompiledKernelsWarning,
                     stacklevel=4,
                 )

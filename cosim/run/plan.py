@@ -20,30 +20,10 @@ Solver = Literal["ode1", "ode2", "ode3", "ode4"]
 
 @dataclass(frozen=True, kw_only=True)
 class RunPlan:
-    """The options of a run.
+    """The options of a run, which `simulate` explains; wrong ones are refused when the plan is made.
 
-    step
-        the communication step h, in s
-    start
-        t_0 in s
-    coupling
-        "sampled", as a real controller: inputs are held over a step (coupling/sampled.py).
-        "continuous", stage coupling: everything with continuous state is integrated
-        together by `solver`, blocks run at every stage (coupling/stage.py).
-        "iterated": as sampled, but FMUs and Continuous participants that are connected
-        directly agree at every communication point, by repeating steps (coupling/iterated.py)
-    solver
-        of stage coupling: "ode1" to "ode4"
-    record
-        ports to record, such as "plant.x"; None records every output and state
-    statistics
-        ports to keep statistics of; None takes the recorded ones
-    decimation
-        record every n-th communication point
-    jit
-        False calls every kernel as Python: for a debugger
-    tolerance
-        of iterated coupling, relative to the size of each exchanged value
+    It goes whole to the instances, the couplings and the recorder, and a branch of a simulation
+    is made from it again. `record` and `statistics` become tuples of names.
     """
 
     step: float
@@ -57,7 +37,7 @@ class RunPlan:
     tolerance: float = 1e-8
 
     def __post_init__(self) -> None:
-        """Check the options, and keep those that may come in several types in one."""
+        """Check the options; turn numbers and names into one type each."""
         step, start = _seconds("step", self.step), _seconds("start", self.start)
         if step <= 0.0:
             raise TimeError(f"step={step:g} s; a communication step must be above zero")

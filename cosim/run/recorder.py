@@ -89,7 +89,7 @@ class Recorder:
             texts.clear()
 
     def recording(self, start: float, step: float) -> dict[str, Any]:
-        """Return what was recorded since `open`: time, signals, texts, units and statistics of a Result."""
+        """Return the recording since `open`: time, signals, texts, units and statistics of a Result."""
         n = int(self._place[1])
         points = self._first + np.arange(n, dtype=np.float64)
         signals = {}

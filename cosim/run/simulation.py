@@ -13,7 +13,7 @@ is summed up. A run is put together in four steps, each in a file of its own:
     plan.py      the options, checked
     binding.py   the components of the system as running instances, its connections as copies
     coupling/    the operations of a communication step, in their order: `Result.schedule`
-    recorder.py  what is recorded at a communication point
+    recorder.py  signals, texts and statistics, recorded at communication points
 
 and then carried out by the compiled loop (cosim/loop).
 """

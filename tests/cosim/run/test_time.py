@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim import Block, DeclarationError, Input, Output, State, System, TimeError, simulate
+from cosim.core.time_grid import steps_between
 from tests.cosim.parts import Counter, Gain, Integrator, Mass, Ramp, Through
 
 
@@ -176,6 +177,33 @@ def test_a_sample_period_that_is_no_multiple_is_refused_never_rounded(period):
 def test_wrong_rates_are_refused_where_they_are_given(options):
     with pytest.raises(DeclarationError, match="Ramp"):
         Ramp(**options)
+
+
+@pytest.mark.parametrize(
+    ("period", "h", "proposed"),
+    [
+        (1.0, 0.03, "0.025"),  # 34 steps would be 0.0294118 s, which does not divide 1 s
+        (0.15, 0.1, "0.075"),
+        (12.0, 0.7, "0.6"),
+        (0.3000001, 0.1, "0.3000001/4"),  # no step of six digits fits
+        (math.pi, 0.01, "3.141592653589793/315"),
+        (0.05, 0.1, "0.05"),
+        (1.0, 0.1 + 1e-8, "0.1"),
+    ],
+)
+def test_the_step_that_an_error_proposes_is_accepted(period, h, proposed):
+    with pytest.raises(TimeError, match=f"choose a step such as {proposed} s$") as caught:
+        steps_between(period, h, "the time")
+    assert "is 3 communication" not in str(caught.value)  # 3.000001 must not look whole
+    numerator, _, denominator = proposed.partition("/")
+    assert steps_between(period, float(numerator) / float(denominator or 1), "the time") >= 1
+
+
+def test_a_count_of_steps_beyond_the_precision_of_the_ratio_passes():
+    """1e8 / 0.001 is off by one unit in its last place, 1.5e-5 of a step."""
+    assert steps_between(1e8, 0.001, "the time") == 10**11
+    with pytest.raises(TimeError, match=r"100000000000\.5 communication steps"):
+        steps_between(1e8 + 0.0005, 0.001, "the time")
 
 
 def test_decimal_steps_pass():
