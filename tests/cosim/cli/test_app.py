@@ -258,6 +258,25 @@ def test_export_and_inspect(scenario, tmp_path, capsys):
     assert line.split()[:9] == ["v", "Real", "output", "m/s", "2.0", "-", "continuous", "-", "-"]
 
 
+def test_inspection_shows_bounds_and_escapes_what_would_control_the_terminal(scenario, tmp_path, capsys):
+    """The brake's damping has min = 0; a description with an escape sequence is shown as text."""
+    path = tmp_path / "brake.fmu"
+    assert call("export", f"{scenario}:brake", "--out", path) == 0
+    changed = tmp_path / "changed.fmu"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(changed, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                data = data.replace(b'description="damping"', 'description="dam\u202eping"'.encode())
+            new.writestr(name, data)
+    assert call("inspect", changed) == 0
+    text = capsys.readouterr().out
+    (line,) = (line for line in text.splitlines() if line.startswith("b "))
+    columns = line.split()
+    assert columns[6:9] == ["fixed", "0.0", "-"]
+    assert "dam\\u202eping" in line
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
