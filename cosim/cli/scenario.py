@@ -98,9 +98,18 @@ class Scenario:
         part = self._parts.get(name)
         return part if callable(part) else None
 
+    def _class(self, name: str) -> Any:
+        declared = self._part(name)
+        if declared is not None and not dataclasses.is_dataclass(declared):
+            raise ScenarioError(
+                f"scenario {self.name}: class {name} must be a dataclass; put "
+                "@dataclass(frozen=True, kw_only=True) above it"
+            )
+        return declared
+
     def study(self) -> Options:
         """Return the options of the study."""
-        if declared := self._part("Study"):
+        if declared := self._class("Study"):
             return Options(declared, declared)
         run = self._part("run")
         if run is None:
@@ -115,7 +124,7 @@ class Scenario:
 
     def table(self) -> Options:
         """Return the options of the table."""
-        if declared := self._part("Table"):
+        if declared := self._class("Table"):
             return Options(declared, declared)
         table = self._part("table")
         if table is None:

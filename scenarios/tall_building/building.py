@@ -44,7 +44,7 @@ ROOF_MASS = 747.1e3
 
 
 class StructureError(CosimError):
-    """Matrices that are no structure, or not one that a plant can take."""
+    """Matrices that do not form a structure, or a structure that a plant cannot take."""
 
 
 @dataclass(frozen=True)
