@@ -24,8 +24,9 @@ from ..result import Interrupted, Result, SimulationError
 from ..system.system import System
 from .json_text import json_text
 from .load import find_participant, load_scenario
+from .python_scenario import scenario_names, summary
 from .run_directory import RunDirectory
-from .scenario import Options, Scenario, ScenarioError, aligned, scenario_names, summary
+from .scenario import Options, Scenario, ScenarioError, aligned
 
 _SETTINGS: dict[str, Any] = {
     "result_action": "return_value",

@@ -30,7 +30,12 @@ def inspection(path: Path) -> str:
         ("event indicators", f"{description.numberOfEventIndicators}"),
     ]
     lines = [f"{name:<20}{text}".rstrip() for name, text in facts]
-    return "\n".join([*lines, "", aligned([_row(v) for v in description.modelVariables])])
+    return _printable("\n".join([*lines, "", aligned([_row(v) for v in description.modelVariables])]))
+
+
+def _printable(text: str) -> str:
+    """Escape the characters of an FMU's names and texts that would control the terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
 
 
 def _capabilities(root: Any, interface: str) -> str:

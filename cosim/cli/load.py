@@ -6,7 +6,8 @@ from pathlib import Path
 
 from ..core.participant import Participant
 from .fmu_scenario import fmu_scenario
-from .scenario import Scenario, ScenarioError, python_scenario
+from .python_scenario import python_scenario
+from .scenario import Scenario, ScenarioError
 from .ssp_scenario import ssp_scenario
 
 

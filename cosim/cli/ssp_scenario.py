@@ -14,7 +14,8 @@ from ..run.plan import Coupling, Solver
 from ..run.simulation import simulate
 from ..ssp.reader import Package, read_package
 from ..system.system import System
-from .scenario import Scenario, ScenarioError, find_part
+from .python_scenario import find_part
+from .scenario import Scenario, ScenarioError
 
 
 @dataclass(frozen=True, kw_only=True)

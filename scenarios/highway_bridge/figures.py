@@ -13,6 +13,13 @@ from cosim import Array, Result
 from .bridge import EI, M_Y, SEGMENT
 from .criteria import BEARINGS, curvatures, moments
 
+#: ports of the bearings' displacements, and what they are of
+COMPARED = {
+    "none.deformation": "without control",
+    "lqg.deformation": "LQG",
+    "bridge.deformation": "this run",
+}
+
 
 def figures(result: Result) -> dict[str, Figure]:
     """Return figures 3.7 to 3.9, hysteresis loops of a bearing and a column, and the yield map."""
@@ -31,13 +38,8 @@ def displacements(result: Result, sensor: int, name: str) -> Figure:
     """Return the displacement at a sensor (0, 1, ...) in x and y, beside the runs to compare with."""
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
-    compared = [
-        ("none.deformation", "without control"),
-        ("lqg.deformation", "LQG"),
-        ("bridge.deformation", "this run"),
-    ]
     for direction, ax in enumerate(axes):
-        for port, label in compared:
+        for port, label in COMPARED.items():
             if port in result:
                 ax.plot(
                     result.time, 1e3 * result[port][:, 2 * sensor + direction], linewidth=0.7, label=label
@@ -47,7 +49,15 @@ def displacements(result: Result, sensor: int, name: str) -> Figure:
     axes[0].set_title(f"Bridge displacement at the position of the {name} sensor")
     axes[0].legend(loc="upper right", fontsize="small")
     axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlim(0.0, _end_of_motion(result))
     return figure
+
+
+def _end_of_motion(result: Result) -> float:
+    """Return the time after which no bearing moves by more than 2 % of the largest displacement."""
+    moved = [np.abs(result[p]).max(axis=1) for p in COMPARED if p in result]
+    largest = np.max(moved, axis=0)
+    return float(result.time[np.flatnonzero(largest > 0.02 * largest.max())[-1]])
 
 
 def nodes(result: Result) -> Figure:
@@ -77,6 +87,7 @@ def loops(result: Result, phi: Array) -> Figure:
     right.set_ylabel("moment (MN·m)")
     right.set_title(f"column {j // (phi.shape[1] // 2) + 1}")
     for ax in (left, right):
+        ax.locator_params(axis="x", nbins=5)
         ax.grid(alpha=0.3)
     return figure
 

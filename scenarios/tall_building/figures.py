@@ -74,7 +74,8 @@ def profile(result: TowerResult) -> Figure:
         strict=True,
     ):
         for name, statistics in result.profiles.items():
-            axes.plot(100 * getattr(statistics[port], kind), height, label=name)
+            label_of = {"none": "no control", "lqg": "LQG"}.get(name, name)
+            axes.plot(100 * getattr(statistics[port], kind), height, label=label_of)
         axes.set_xlabel(label)
         axes.grid(alpha=0.3)
     grid[0, 0].set_ylabel("height (m)")

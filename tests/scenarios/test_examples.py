@@ -1,4 +1,4 @@
-"""The scripts that a user copies: they run as their docstrings say, and their numbers are right."""
+"""The scripts that a user copies: their commands run, and their numbers are right."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def test_an_example_is_short(name: str) -> None:
 def test_a_controller_on_somebody_elses_plant(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], version: str
 ) -> None:
-    """pythonfmu's plants against their recursion in Python, bit for bit: one sample late would show.
+    """Plants of pythonfmu against their recursion in Python, bit for bit: a shift by a sample would show.
 
-    They state no units, so the force's number in kN is what they get.
+    They state no units, so they take the force's number in kN as it is.
     """
     path = swing(tmp_path, version)
     main(["inspect", str(path)])
@@ -80,7 +80,7 @@ def test_units_of_the_plant_are_heeded() -> None:
 
 
 def test_a_building_in_somebody_elses_loop(tmp_path: Path) -> None:
-    """The script alone, where our packages cannot be imported; its number is that of our own loop."""
+    """The script alone, without access to this project; its number is that of the project's loop."""
     path = export(building_in_fmpy.build().participants["building"], tmp_path / "building.fmu")
     (tmp_path / "alone").mkdir()
     script = tmp_path / "alone" / "building_in_fmpy.py"
@@ -88,7 +88,7 @@ def test_a_building_in_somebody_elses_loop(tmp_path: Path) -> None:
     blocked = tmp_path / "blocked"
     for package in ("cosim", "fmus", "controllers", "scenarios"):
         (blocked / package).mkdir(parents=True)
-        (blocked / package / "__init__.py").write_text("raise ImportError('the loop needs none of ours')")
+        (blocked / package / "__init__.py").write_text("raise ImportError('the script must need FMPy only')")
     done = subprocess.run(
         [sys.executable, str(script), str(path)], capture_output=True, text=True, check=False,
         env={**os.environ, "PYTHONPATH": str(blocked)}, cwd=script.parent,
@@ -108,7 +108,7 @@ def test_the_loop_imports_fmpy_only() -> None:
 
 
 def test_a_controller_in_an_ssp(tmp_path: Path) -> None:
-    """ecos computes our loop with its delays; without them the loop is another one.
+    """ecos computes the loop with its delays; without the delays the loop gives other numbers.
 
     1e-12: the ground reads the time, which ecos sums up from steps.
     """

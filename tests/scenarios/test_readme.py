@@ -11,7 +11,7 @@ import pytest
 
 import scenarios
 from cosim.cli.app import main
-from cosim.cli.scenario import scenario_names
+from cosim.cli.python_scenario import scenario_names
 from scenarios.chattering.table import Table as Chattering
 from scenarios.highway_bridge.table import Table as HighwayBridge
 from scenarios.highway_bridge.table import means_text

@@ -145,6 +145,19 @@ def test_a_study_class_gives_the_options_of_its_fields(tmp_path, capsys):
     assert call("export", f"{path}:mass", "--out", tmp_path / "mass.fmu") == 0
 
 
+def test_a_study_that_is_not_a_dataclass_or_needs_an_option(tmp_path, capsys):
+    """A plain class is refused with the line to add; a field without default is a required option."""
+    functions = SCENARIO[SCENARIO.index("def build") :]
+    plain, needing = tmp_path / "plain.py", tmp_path / "needing.py"
+    plain.write_text(SCENARIO.replace(functions, STUDY.replace("@dataclass(frozen=True, kw_only=True)", "")))
+    assert "class Study must be a dataclass; put @dataclass" in refused(capsys, "run", plain)
+    needing.write_text(SCENARIO.replace(functions, STUDY.replace("b: float = 1.5", "b: float")))
+    assert "--b" in refused(capsys, "run", needing, "--out", tmp_path / "out")
+    assert call("run", needing, "--b", 3.0, "--out", tmp_path / "out") == 0
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["options"]["b"] == 3.0
+    assert "give every option of Study a default" in refused(capsys, "export", f"{needing}:mass")
+
+
 def test_list_names_the_scenarios(capsys):
     """Every study is listed; modules that only help a study are not."""
     assert call("list") == 0
@@ -258,6 +271,25 @@ def test_export_and_inspect(scenario, tmp_path, capsys):
     assert line.split()[:9] == ["v", "Real", "output", "m/s", "2.0", "-", "continuous", "-", "-"]
 
 
+def test_inspection_shows_bounds_and_escapes_what_would_control_the_terminal(scenario, tmp_path, capsys):
+    """The brake's damping has min = 0; a description with an escape sequence is shown as text."""
+    path = tmp_path / "brake.fmu"
+    assert call("export", f"{scenario}:brake", "--out", path) == 0
+    changed = tmp_path / "changed.fmu"
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(changed, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                data = data.replace(b'description="damping"', 'description="dam\u202eping"'.encode())
+            new.writestr(name, data)
+    assert call("inspect", changed) == 0
+    text = capsys.readouterr().out
+    (line,) = (line for line in text.splitlines() if line.startswith("b "))
+    columns = line.split()
+    assert columns[6:9] == ["fixed", "0.0", "-"]
+    assert "dam\\u202eping" in line
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -332,11 +364,11 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
 
 
 WRONG = {
-    # what is wrong: (text of the scenario, what stands there instead, what the error says)
+    # mistake: (text of the scenario, its replacement, words of the error)
     "unknown port": ('("mass.v", "brake.v")', '("mass.w", "brake.v")', "mass has no output 'w'"),
     "unknown participant": ('("mass.v", "brake.v")', '("mas.v", "brake.v")', "did you mean 'mass'"),
     "incompatible unit": ('v = Input(unit="m/s")', 'v = Input(unit="kg")', "'m/s'"),
-    "rate that is no whole number": (
+    "rate that is not a whole number": (
         "Brake(b=b)",
         "Brake(b=b, sample_period=0.025)",
         "2.5 communication steps",

@@ -74,7 +74,7 @@ def test_a_table_between_its_rows_at_its_rows_and_outside():
     ("instants", "rows", "words"),
     [([0.0, 1.0], [1.0], "do not fit"), ([1.0, 0.0], [1.0, 2.0], "do not decrease"), ([], [], "at least 1")],
 )
-def test_tables_that_are_none(instants, rows, words):
+def test_invalid_tables_are_refused(instants, rows, words):
     with pytest.raises(DeclarationError, match=words):
         TableSource(instants, rows)
     with pytest.raises(DeclarationError, match="did you mean 'linear'"):
@@ -136,7 +136,7 @@ def test_discrete_inputs_are_held(folder, tmp_path):
         ),
     ],
 )
-def test_files_that_are_no_inputs(folder, tmp_path, text, words):
+def test_invalid_input_files_are_refused(folder, tmp_path, text, words):
     (tmp_path / "in.csv").write_text(text)
     with pytest.raises(Exception, match=words) as caught:
         connect_inputs(System({"chain": FMU(folder / "chain.fmu")}), "chain", tmp_path / "in.csv")
@@ -149,7 +149,7 @@ FLOATS = st.floats(allow_nan=False, allow_infinity=False, width=64)
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.floats(0.0, 1e6), FLOATS, FLOATS), min_size=1, max_size=20))
 def test_numbers_come_out_of_a_file_as_they_went_in(folder, tmp_path, rows):
-    """repr and float are inverse to each other: the table of the block is what was written, bit for bit."""
+    """repr and float are inverse to each other: the block's table equals the written one, bit for bit."""
     rows = sorted(rows, key=lambda row: row[0])
     lines = [f"{t!r}, {a!r}  {b!r}" for t, a, b in rows]
     (tmp_path / "in.csv").write_text("\r\n".join(["time,u", *lines]))
@@ -162,7 +162,7 @@ def test_numbers_come_out_of_a_file_as_they_went_in(folder, tmp_path, rows):
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(alphabet='timeu[12],"\n\r\t .-+e5nax\0é', max_size=60))
-def test_any_text_is_inputs_or_an_error_of_ours(folder, tmp_path, text):
+def test_any_text_is_a_table_of_inputs_or_a_clear_error(folder, tmp_path, text):
     (tmp_path / "in.csv").write_text(text, encoding="utf-8", newline="")
     system = System({"chain": FMU(folder / "chain.fmu")})
     with contextlib.suppress(CosimError):
@@ -170,7 +170,7 @@ def test_any_text_is_inputs_or_an_error_of_ours(folder, tmp_path, text):
         assert len(system.participants) > 1
 
 
-def test_a_missing_or_binary_file_and_a_text_input(folder, tmp_path):
+def test_a_missing_or_binary_file_is_refused(folder, tmp_path):
     system = System({"p": FMU(folder / "probe.fmu")})
     with pytest.raises(RecordError, match="cannot be read"):
         connect_inputs(system, "p", tmp_path / "missing.csv")
@@ -240,7 +240,7 @@ def test_scheduled_execution_is_refused(tmp_path, capsys):
     assert words in capsys.readouterr().err
 
 
-def test_an_end_that_the_fmu_asks_for_is_told(folder, tmp_path, monkeypatch, capsys):
+def test_an_end_at_the_request_of_the_fmu_is_reported(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     ends = ["--start", "end_at_bounce=2", "--stop", "9", "--step", "0.5"]
     main(["run", str(folder / "ball.fmu"), *ends])
@@ -270,7 +270,7 @@ def test_a_crash_of_an_isolated_fmu_keeps_what_was_computed(tmp_path, monkeypatc
         (["--stop", "2", "--step", "0.1", "--record", "hh"], "did you mean 'h'"),
     ],
 )
-def test_what_is_wrong_on_the_command_line(folder, tmp_path, monkeypatch, capsys, arguments, words):
+def test_wrong_options_are_refused_with_a_remedy(folder, tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as caught:
         main(["run", str(folder / "ball.fmu"), *arguments])

@@ -132,7 +132,7 @@ def test_errors_end_with_code_2_and_one_text(folder, capsys, options, message):
     assert message in error
 
 
-def test_a_file_that_does_not_say_how_it_is_run(folder, capsys):
+def test_a_file_without_a_default_experiment(folder, capsys):
     text = SCENARIO.replace("STEP, STOP = 0.01, 1.0", "")
     (folder / "bare.py").write_text(text.replace("step=STEP, stop=STOP", "step=1.0, stop=1.0"))
     assert call("export", "bare.py") == 0

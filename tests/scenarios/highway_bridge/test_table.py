@@ -72,7 +72,7 @@ def test_cells_below_one_are_those_that_the_print_has_below_one():
 
 
 def test_rows_and_text_of_a_short_table():
-    """Two seconds; records that no package ships are null and said so; J21 of the network is no number."""
+    """Two seconds; records that no package ships are null and named; the network has no J21."""
     table = Table(controllers=("scwnn", "scwnn-not-learning", "passive"), duration=2.0)
     rows = table.rows()
     assert len(rows) == 6 * 3 * 21

@@ -51,7 +51,7 @@ def test_default_building_is_the_benchmark_where_it_matters() -> None:
 
 @needs_data
 def test_benchmark_matrices_give_the_benchmark_frequencies() -> None:
-    """To 1e-4, the digits that are known."""
+    """To 1e-4, the known digits."""
     modes = modes_of(load_building(str(TOWER)))
     np.testing.assert_allclose(modes.frequency[:5], BENCHMARK_FREQUENCIES, rtol=1e-4)
     np.testing.assert_allclose(modes.ratio[:5], 0.01, rtol=1e-4)
@@ -77,7 +77,7 @@ def test_damper_rows_are_the_printed_ones_with_the_reaction() -> None:
     assert residual[76] == pytest.approx(damper - u, rel=1e-12)
 
 
-def test_what_is_no_structure_is_refused_with_a_reason(tmp_path: Path) -> None:
+def test_invalid_matrices_are_refused_with_a_reason(tmp_path: Path) -> None:
     b = default_building()
     with pytest.raises(StructureError, match="C has shape"):
         Structure(b.M, b.C[:3, :3], b.K)

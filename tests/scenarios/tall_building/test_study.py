@@ -16,7 +16,7 @@ from tests.benchmark_data import TOWER, needs_data
 
 @pytest.mark.parametrize("data", [None, pytest.param(str(TOWER), marks=needs_data)])
 def test_uncontrolled_response_is_the_printed_one(data: str | None) -> None:
-    """The four figures within 3 %, as the study asks; 900 s."""
+    """The four figures within 3 %, to which the wind was calibrated; 900 s."""
     figures = plant.reference(data, None, plant.SEED, plant.DURATION).figures()
     for name, printed in UNCONTROLLED.items():
         assert figures[name] == pytest.approx(printed, rel=0.03), name
@@ -108,7 +108,7 @@ def test_damper_as_a_plant_of_its_own_couples_to_first_order_or_iterated_to_seco
     assert last["iterated"]["x76"] < 5e-3 * last["sampled"]["x76"] < 5e-3 * 0.02
 
 
-def test_bad_options_say_what_to_do() -> None:
+def test_bad_options_are_refused_with_a_remedy() -> None:
     with pytest.raises(CosimError, match="floor 76 is measured"):
         Study(floors=(50, 75)).build()
     with pytest.raises(CosimError, match="outside its bounds"):
