@@ -21,7 +21,6 @@ which stands in for a wind tunnel record that is not available.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -30,6 +29,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cosim import Array, Block, DeclarationError, Output, Parameter, RecordError
+from cosim.blocks.table_source import row_at
 
 
 @dataclass(frozen=True)
@@ -123,12 +123,10 @@ class FloorLoad(Block):
     w = Output("forces on the floors", shape="n", unit="N")
 
     def step(self, t: float, h: float) -> None:
-        rows = self.table.shape[0]
-        q = min(max(t / self.dt, 0.0), rows - 1.0)  # before its start and after its end the table is held
-        i = max(min(math.floor(q + 1e-9), rows - 2), 0)
-        after = min(i + 1, rows - 1)
+        i, q = row_at(t, self.dt, self.table.shape[0])
+        after = min(i + 1, self.table.shape[0] - 1)
         for j in range(self.w.shape[0]):
-            self.w[j] = self.table[i, j] + (q - i) * (self.table[after, j] - self.table[i, j])
+            self.w[j] = self.table[i, j] + q * (self.table[after, j] - self.table[i, j])
 
 
 def load_forces(path: str | PathLike[str], floors: int) -> tuple[Array, float]:
