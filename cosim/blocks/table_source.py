@@ -72,12 +72,10 @@ class TableSource(Block):
         low, high = 0, n  # the last row at or before now is below `high`
         q = 0.0
         if self.interval > 0.0:
-            place = min(t / self.interval, n - 1.0) if t > 0.0 else 0.0
             if self.linear != 0.0:
-                low = max(min(math.floor(place + 1e-9), n - 2), 0)
-                q = place - low
+                low, q = row_at(t, self.interval, n)
             else:
-                low = min(math.floor(place + 1e-9), n - 1)
+                low = min(math.floor(min(t / self.interval, n - 1.0) + 1e-9), n - 1) if t > 0.0 else 0
             high = low + 1
         else:
             now = t + 1e-9 * h
@@ -92,3 +90,10 @@ class TableSource(Block):
         for i in range(self.y.shape[0]):
             v = self.rows[low, i]
             self.y[i] = v if q == 0.0 else v + q * (self.rows[high, i] - v)
+
+
+def row_at(t: float, interval: float, n: int) -> tuple[int, float]:
+    """Return i and q of a time between rows i and i + 1 of n at a constant interval, its ends held."""
+    place = min(t / interval, n - 1.0) if t > 0.0 else 0.0
+    low = max(min(math.floor(place + 1e-9), n - 2), 0)
+    return low, place - low

@@ -1,4 +1,4 @@
-"""From a participant to an .fmu file: `export` writes one, `as_fmu` writes it to the cache and loads it."""
+"""From a participant to an FMU: `export` writes a file, `as_fmu` writes one to the cache and loads it."""
 
 from .cached import as_fmu
 from .description import DefaultExperiment

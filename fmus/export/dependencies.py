@@ -7,10 +7,10 @@ kernels compares no floating-point numbers, so the same instructions run whateve
 values, and outputs are analytic functions of them (sums, products, quotients, functions
 of libm). An analytic function that does not depend on an element never changes with it;
 one that depends on it changes at almost every point. Points are drawn at random, and
-taken at zero too, where nothing large hides a small change in the last digit. Settable
+taken at zero too, where no large term hides a small change. Settable
 parameters are drawn as well, so that a coefficient that happens to be 0 counts.
 
-Where numbers are compared (a saturation, a sign, a hysteresis) the answer by variable stands.
+Where numbers are compared (a saturation, a sign, a hysteresis), the answer by variable is kept.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ Evaluation = Callable[[Array, float], bool]
 
 
 @dataclass(frozen=True)
-class Structure:
+class ModelStructure:
     """Dependencies by slot.
 
     running
         of outputs, states and derivatives on inputs and states
     initial
         of outputs and derivatives on inputs, states and parameters when initialisation ends;
-        what is not in it may depend on all of them
+        an unknown that is missing may depend on all of them
     """
 
     derivative_of: Mapping[int, int]
@@ -57,15 +57,15 @@ class Structure:
     initial: Mapping[int, tuple[int, ...]]
 
 
-def structure(participant: Participant, kernels: str) -> Structure:
-    """Return the structure of a participant whose kernels have been lowered to `kernels`."""
+def model_structure(participant: Participant, kernels: str) -> ModelStructure:
+    """Return the dependencies of a participant whose kernels have been lowered to `kernels`."""
     variables = participant.variables
     slots = {kind: [s for v in variables.values() if v.kind == kind for s in _slots(v)] for kind in KINDS}
     if not isinstance(participant, Continuous):
-        # What a block computed in its last step is held: nothing depends on an input at once.
+        # Outputs of a block are held from its last step: none depends on an input at once.
         held = {slot: () for kind in ("output", "state") for slot in slots[kind]}
-        return Structure({}, held, {} if "initialize" in participant.kernels else held)
-    with_derivatives = slots["state"] if slots["derivative"] else []  # none: it moves by advance alone
+        return ModelStructure({}, held, {} if "initialize" in participant.kernels else held)
+    with_derivatives = slots["state"] if slots["derivative"] else []  # none: states move by advance alone
     derivative_of = dict(zip(with_derivatives, slots["derivative"], strict=True))
     running: dict[int, tuple[int, ...]] = {}
     for name, known in dependencies(participant).items():
@@ -84,7 +84,7 @@ def structure(participant: Participant, kernels: str) -> Structure:
             if len(parameters) <= _MOST_PARAMETERS:
                 initial = {u: tuple(sorted(changed[u])) for u in unknown}
     running |= {slot: (slot,) for slot in slots["state"]}  # a state is known, and an output
-    return Structure(derivative_of, running, initial)
+    return ModelStructure(derivative_of, running, initial)
 
 
 def _settable(participant: Participant) -> list[Variable]:
@@ -96,7 +96,7 @@ def _slots(v: Variable) -> range:
 
 
 def _evaluation(participant: Participant, kernels: str) -> str:
-    """Return the IR of what an evaluation runs: `initialize` only if parameters can change what it does."""
+    """Return the IR of an evaluation; `initialize` is part of it if there are parameters to set."""
     names = ("derivatives", "outputs", *(["initialize"] if _settable(participant) else []))
     return "".join(body for name in names for body in reachable(kernels, name).values())
 
@@ -104,11 +104,11 @@ def _evaluation(participant: Participant, kernels: str) -> str:
 def _changes(
     participant: Participant, address: Callable[[str], int], unknown: list[int], known: list[int]
 ) -> dict[int, set[int]] | None:
-    """Return, for every unknown slot, the known ones that change it in a probe; None outside the domain."""
+    """Return, for each unknown slot, the known ones that change it in a probe; None if a probe fails."""
     run = _runner(participant, address)
     changed = {slot: set[int]() for slot in unknown}
     slots = np.array(unknown)
-    first, size = participant.zones["local"]  # working memory: what is in it before does not matter
+    first, size = participant.zones["local"]  # working memory, whose contents do not matter
     ports, rest = slice(0, first), slice(first + size, None)
     generator = np.random.default_rng(1)
     for probe in range(2 * _PROBES):
@@ -150,7 +150,7 @@ def _point(participant: Participant, generator: np.random.Generator, *, origin: 
 
 
 def _runner(participant: Participant, address: Callable[[str], int]) -> Evaluation:
-    """Return a function that evaluates a record as the FMU does, and tells whether that went well."""
+    """Return a function that evaluates a record as the FMU does, and returns whether that succeeded."""
     prototype = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_double, ctypes.c_double)
     names = [n for n in ("initialize", "derivatives", "outputs") if n in participant.kernels]
     functions = [prototype(address(f"kernel_{name}")) for name in names]

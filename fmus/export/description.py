@@ -1,7 +1,7 @@
 """modelDescription.xml of an exported participant, FMI 2.0 and 3.0.
 
-What both versions share is worked out once: variables and their roles (`roles`), units
-(`unit_definition`), dependencies by element (structure.py). FMI 2.0 lists every element
+Both versions share variables and their roles (`role`), units (`unit_definition`) and
+dependencies by element (dependencies.py). FMI 2.0 lists every element
 of an array as a scalar variable, `K[2,3]`; FMI 3.0 lists the array. A value reference is
 the slot in the record, of an array the first one.
 
@@ -22,13 +22,13 @@ from cosim import Continuous, Participant, WiringError
 from cosim.core.variables import Variable
 from cosim.units import BASE_UNITS, definition, parse
 
-from .dependencies import Structure
+from .dependencies import ModelStructure
 from .link import ExportError, Model, fmi_name, is_listed
 
 
 @dataclass(frozen=True)
 class DefaultExperiment:
-    """What a host simulates when it is told nothing: also the experiment of the reference result."""
+    """Times that a host uses by default, and those of the reference result, in s."""
 
     start: float = 0.0
     stop: float = 10.0
@@ -37,7 +37,7 @@ class DefaultExperiment:
 
 @dataclass(frozen=True)
 class Role:
-    """How FMI sees a variable."""
+    """Attributes of a variable in FMI."""
 
     causality: str
     variability: str
@@ -49,7 +49,9 @@ def role(v: Variable, participant: Participant) -> Role:
     """Return causality, variability and initial: outputs and derivatives are calculated, others exact."""
     changes = "continuous" if isinstance(participant, Continuous) else "discrete"
     return {
-        "input": Role("input", "continuous", None, True),  # a block samples what may change at any time
+        "input": Role(
+            "input", "continuous", None, True
+        ),  # a block samples inputs that may change at any time
         "output": Role("output", changes, "calculated", False),
         "state": Role("output", changes, "exact", True),
         "derivative": Role("local", "continuous", "calculated", False),
@@ -195,7 +197,7 @@ def _text(root: etree._Element) -> bytes:
 def fmi2_description(
     participant: Participant,
     model: Model,
-    structure: Structure,
+    structure: ModelStructure,
     interfaces: Iterable[str],
     experiment: DefaultExperiment,
 ) -> bytes:
@@ -227,7 +229,7 @@ def fmi2_description(
         section = etree.SubElement(tree, tag) if unknowns else None
         for e in unknowns:
             unknown = etree.SubElement(section, "Unknown", index=str(index[e.slot]))
-            if (needed := known.get(e.slot)) is not None:  # None: all, said by leaving the attribute out
+            if (needed := known.get(e.slot)) is not None:  # None: on all, which a missing attribute means
                 unknown.set("dependencies", " ".join(str(index[s]) for s in needed))
     return _text(root)
 
@@ -235,7 +237,7 @@ def fmi2_description(
 def fmi3_description(
     participant: Participant,
     model: Model,
-    structure: Structure,
+    structure: ModelStructure,
     interfaces: Iterable[str],
     experiment: DefaultExperiment,
 ) -> bytes:
@@ -288,7 +290,7 @@ def _add_role(v: etree._Element, e: Element) -> None:
 
 
 def _unknowns(
-    listed: list[Element], structure: Structure
+    listed: list[Element], structure: ModelStructure
 ) -> list[tuple[list[Element], Mapping[int, tuple[int, ...]]]]:
     """Return outputs, derivatives and initial unknowns, each with its dependencies by slot."""
     outputs = [e for e in listed if e.role.causality == "output"]

@@ -1,10 +1,10 @@
-"""A participant leaves as an FMU: `export(participant, "plant.fmu")`.
+"""Export of a participant as an FMU: `export(participant, "plant.fmu")`.
 
-    kernels (Python) -> LLVM IR -> shared library per platform      cosim.compiler, link.py
-    declarations     -> modelDescription.xml                        description.py, structure.py
+    kernels (Python) -> LLVM IR -> shared library per platform      cosim/codegen, link.py
+    declarations     -> modelDescription.xml                        description.py, dependencies.py
     the FMU itself   -> reference result, FMI-LS-REF                reference.py
 
-The file is reproducible: the same participant gives the same bytes.
+The same participant gives the same bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cosim import Block, Continuous, CosimError, Participant
 from cosim.codegen.c_compiler import Platform, host
 from cosim.codegen.kernels import lower
 
-from .dependencies import structure
+from .dependencies import model_structure
 from .description import DefaultExperiment, fmi2_description, fmi3_description
 from .link import ExportError, build_model, find_platform, link
 from .reference import reference_files
@@ -44,7 +44,7 @@ def export(
     """Write a participant, with the values it has now as start values, as a native FMU.
 
     platforms
-        names of `cosim.c_compiler.PLATFORMS`; this machine's by default
+        names in `cosim.codegen.c_compiler.PLATFORMS`; that of this machine by default
     interfaces
         "ModelExchange", "CoSimulation" or both (the default; a Block has Co-Simulation only)
     experiment
@@ -55,18 +55,20 @@ def export(
     name = type(participant).__name__
     wanted = [find_platform(p) for p in dict.fromkeys(platforms if platforms is not None else [host()])]
     if not wanted:
-        raise ExportError(f"{name}: an FMU for no platform has nothing to run; name at least one")
+        raise ExportError(f"{name}: platforms is empty; name at least one, or leave it out for this machine")
     if fmi_version not in FMI_VERSIONS:
-        raise ExportError(f"no FMI version '{fmi_version}'; choose from {', '.join(FMI_VERSIONS)}")
+        raise ExportError(
+            f"{name}: FMI version '{fmi_version}' is not supported; choose from {', '.join(FMI_VERSIONS)}"
+        )
     offered = _interfaces(participant, interfaces)
     _check(participant, name)
     plan = experiment or _default_experiment(participant)
     if not (plan.step > 0.0 and plan.stop > plan.start):
-        raise ExportError(f"{name}: default experiment {plan}: step above zero and stop after start, please")
+        raise ExportError(f"{name}: {plan}: the step must be above zero and the stop after the start")
     kernels = lower(participant)
     model = build_model(participant, name, fmi_version, kernels)
     describe = _DESCRIPTIONS[fmi_version]
-    text = describe(participant, model, structure(participant, kernels), offered, plan)
+    text = describe(participant, model, model_structure(participant, kernels), offered, plan)
     files = {"modelDescription.xml": text}
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.fmu"
@@ -81,17 +83,17 @@ def export(
 
 def _check(participant: Participant, name: str) -> None:
     if not isinstance(participant, (Block, Continuous)):
-        raise ExportError(f"a {name} is neither a Block nor a Continuous; only these become FMUs")
+        raise ExportError(f"{name} is neither a Block nor a Continuous; only these can be exported")
     if not participant.compiled:
         raise ExportError(
-            f"{name} runs as Python (compiled = False), which an FMU does not carry; "
+            f"{name} runs as Python (compiled = False), which an FMU cannot contain; "
             "write its kernels in the compilable subset to export it"
         )
     if not (name.isascii() and name.isidentifier()):
-        raise ExportError(f"class name {name} is no C identifier; FMI needs one, rename the class")
+        raise ExportError(f"{name}: the name of the class must be a C identifier in FMI; rename the class")
     for v in participant.variables.values():
         if not v.name.isascii():
-            raise ExportError(f"{name}.{v.name}: names in an FMU are ASCII; rename the variable")
+            raise ExportError(f"{name}.{v.name}: names in an FMU must be ASCII; rename the variable")
 
 
 def _interfaces(participant: Participant, interfaces: Iterable[str] | None) -> tuple[str, ...]:
@@ -101,10 +103,13 @@ def _interfaces(participant: Participant, interfaces: Iterable[str] | None) -> t
     for interface in chosen:
         if interface not in possible:
             raise ExportError(
-                f"{type(participant).__name__} has no interface '{interface}'; it has {', '.join(possible)}"
+                f"{type(participant).__name__} has no interface '{interface}'; "
+                f"choose from {', '.join(possible)}"
             )
     if not chosen:
-        raise ExportError(f"{type(participant).__name__}: an FMU needs an interface: {', '.join(possible)}")
+        raise ExportError(
+            f"{type(participant).__name__}: interfaces is empty; name at least one of {', '.join(possible)}"
+        )
     return chosen
 
 
@@ -143,10 +148,10 @@ def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDes
 def _binaries(name: str, libraries: Mapping[Platform, bytes], fmi_version: str) -> dict[str, bytes]:
     """Return the libraries by their place in the archive.
 
-    FMI 3.0 has a folder per architecture. FMI 2.0 has one per system, whatever the
-    architecture, and FMPy looks there on ARM as well. So for macOS the two go into one
-    universal binary; for Linux, which has none, linux64 holds x86_64 if that is wanted
-    and aarch64 otherwise, and the ARM library is in aarch64-linux in any case.
+    FMI 3.0 has a folder for each architecture. FMI 2.0 has one for each system, and FMPy looks
+    there on ARM as well. So for macOS the two libraries become one universal binary. Linux
+    has no such format: linux64 holds x86_64 if that is among the platforms and aarch64
+    otherwise, and aarch64-linux holds the ARM library in any case.
     """
     if fmi_version != "2.0":
         return {f"binaries/{p.name}/{name}{p.suffix}": library for p, library in libraries.items()}
@@ -161,7 +166,7 @@ def _binaries(name: str, libraries: Mapping[Platform, bytes], fmi_version: str) 
 
 
 def _universal(libraries: list[bytes]) -> bytes:
-    """Return a universal Mach-O binary of single ones: a table of contents (big-endian) and the files."""
+    """Return the universal Mach-O binary of libraries: a big-endian table of contents, then the files."""
     alignment = 14
     table, body, offset = [], b"", 1 << alignment
     for library in libraries:

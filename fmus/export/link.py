@@ -1,8 +1,8 @@
 """From kernels in LLVM IR to a shared library.
 
-A library is linked from the kernels of a participant (`cosim.compiler.lower`), the
-front end in fmus/c and one generated C file, the model's table, for every platform of
-`cosim.c_compiler`. It is cached by a hash of all that went into it.
+A library is linked from the kernels of a participant (`cosim.codegen.kernels.lower`), the
+C front end in export/c and one generated C file, the table of the model, for any platform of
+`cosim.codegen.c_compiler`. It is cached by a hash of all its sources.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ _FLAGS = (*LIBRARY_FLAGS, "-Wno-override-module")
 
 
 class ExportError(CosimError):
-    """A participant that cannot leave as an FMU, or a library that cannot be linked."""
+    """A participant cannot be exported as an FMU, or a library cannot be linked."""
 
 
 def find_platform(name: str) -> Platform:
-    """Return the platform of that name, or say which there are."""
+    """Return the platform of that name."""
     if name not in PLATFORMS:
-        raise ExportError(f"no platform '{name}'; choose from {', '.join(PLATFORMS)}")
+        raise ExportError(f"platform '{name}' is not known; choose from {', '.join(PLATFORMS)}")
     return PLATFORMS[name]
 
 
 @dataclass(frozen=True)
 class Model:
-    """All that a library is made of, apart from the platform and the front end."""
+    """All parts of a library but the platform and the front end."""
 
     identifier: str
     fmi_version: str
@@ -67,7 +67,7 @@ class Model:
 
 
 def front_end(fmi_version: str) -> str:
-    """Return the front end's text: part of what makes one export different from another."""
+    """Return the text of the front end, which the token of an FMU depends on."""
     return "".join(p.name + p.read_text() for p in [*_sources(fmi_version), *sorted(_FRONT_END.glob("*.h"))])
 
 
@@ -79,12 +79,12 @@ def build_model(participant: Participant, identifier: str, fmi_version: str, ker
     """Return the model of a participant whose kernels have been lowered to `kernels`."""
     start = participant.memory.astype("<f8")
     for name in participant.CACHE_KEYS:
-        start[participant.variables[name].slot] = 0.0  # matrices of an earlier advance
+        start[participant.variables[name].slot] = 0.0  # no matrices of an earlier advance
     return Model(identifier, fmi_version, kernels, _table(participant, identifier), start.tobytes())
 
 
 def reachable(ir: str, kernel: str) -> dict[str, str]:
-    """Return the functions that a kernel calls, directly or not, and itself, with their IR."""
+    """Return a kernel and the functions that it calls, directly or not, with their IR."""
     bodies = {m[1]: m[0] for m in re.finditer(r'^define\b[^@\n]*@"?([^"(\s]+)"?\(.*?^}', ir, re.M | re.S)}
     reached: dict[str, str] = {}
     waiting = [f"kernel_{kernel}"]
@@ -107,7 +107,7 @@ def _hidden(ir: str) -> str:
 
 
 def _table(participant: Participant, identifier: str) -> str:
-    """Return the C file that defines `model`, but for its token."""
+    """Return the C file that defines `model`, without its token."""
     variables = list(participant.variables.values())
     shapes, rows = [], []
     for i, v in enumerate(variables):
@@ -145,12 +145,12 @@ def _number(x: float) -> str:
 
 
 def is_listed(v: Variable) -> bool:
-    """Tell whether a variable stands in the modelDescription."""
+    """Return whether the modelDescription lists a variable."""
     return v.kind != "local" and not v.fixed
 
 
 def fmi_name(v: Variable) -> str:
-    """Return the name in the modelDescription, without indices: der_x is der(x) there."""
+    """Return the name in the modelDescription, without indices; der_x is der(x) there."""
     return f"der({v.name.removeprefix('der_')})" if v.kind == "derivative" else v.name
 
 
@@ -158,7 +158,7 @@ def fmi_name(v: Variable) -> str:
 
 
 def link(model: Model, platform: Platform) -> bytes:
-    """Return the shared library of a model for a platform, from the cache if it has been linked before."""
+    """Return the shared library of a model for a platform, from the cache if it is there."""
     headers = fmi_headers()
     ir = _hidden(model.kernels)
     parts: list[str] = [platform.target, *_FLAGS, model.token, ir]
@@ -187,9 +187,9 @@ def _compile(model: Model, platform: Platform, ir: str, headers: Path) -> bytes:
 
 
 def warm_up() -> None:
-    """Let the compiler build its runtime for this machine, in the background, where it never ran before.
+    """Let the compiler build its runtime for this machine in the background, unless it has done so before.
 
-    That is most of the time of a first link, and can pass while kernels are compiled.
+    This takes most of the time of a first link, and goes on while kernels are compiled.
     """
 
     def link_nothing() -> None:
@@ -204,6 +204,6 @@ def warm_up() -> None:
 
 
 def _unit(model: Model) -> str:
-    """Return all C code as one unit: zones and kernels are constants in it, a step is 1.4 times faster."""
+    """Return all C code as one unit: with zones and kernels as constants a step is 1.4 times faster."""
     front = [f'#include "{source.name}"' for source in _sources(model.fmi_version)]
     return "\n".join([f'#define MODEL_TOKEN "{model.token}"', model.table, *front, ""])

@@ -1,9 +1,9 @@
 """Reference result inside an FMU, after the layered standard FMI-LS-REF 1.0.0-alpha.1.
 
-The FMU that was just built is run through FMPy, in Co-Simulation if it has it, otherwise
-in Model Exchange by forward Euler: the first steps of its default experiment, every input
-swinging by 1 (in its unit) about its start value, each at another frequency. If the model
-cannot be driven so, inputs are held. In the archive, under
+FMPy runs the FMU that was just built over the first steps of its default experiment, in
+Co-Simulation if it has that, otherwise in Model Exchange by forward Euler. Every input
+swings by 1 (in its unit) about its start value, each at another frequency; if the model
+cannot be driven so, inputs are held. The archive has, under
 extra/org.fmi-standard.fmi-ls-ref:
 
     fmi-ls-manifest.xml    roles of the files
@@ -70,7 +70,7 @@ def reference_files(
 
 
 def _run(fmu: Path, interface: str, participant: Participant, time: Array, h: float, stimuli: Array) -> Array:
-    """Return the outputs at `time`; what the FMU logs is part of the error if it stops."""
+    """Return the outputs at `time`; the log of the FMU is part of the error if it stops."""
     said: list[str] = []
 
     def log(*record: Any) -> None:
@@ -86,12 +86,12 @@ def _run(fmu: Path, interface: str, participant: Participant, time: Array, h: fl
         except Exception as error:  # FMPy raises Exception itself
             why = " | ".join(said[-3:]) or str(error)
             raise ExportError(
-                f"the exported {fmu.stem} does not run its default experiment: {why}"
+                f"the exported FMU {fmu.stem} does not run its default experiment: {why}"
             ) from error
         finally:
             if instance is not None:
                 instance.freeInstance()
-            callbacks()  # FMPy would call `log` for other FMUs, when it is gone
+            callbacks()  # otherwise FMPy would call `log` for other FMUs later
 
 
 def _simulate(

@@ -1,31 +1,30 @@
-"""Complex modes of a classically damped structure with one attached damper, exactly.
+"""Complex modes of a classically damped structure with one attached damper.
 
-Structure in its own modal coordinates eta (mass-normalised, omega_j^2, d_j = 2 zeta_j
-omega_j), damper m, c, k relative to the DOF where the structure's mode shapes are a_j:
+The structure is given in its own modal coordinates eta (normalised by mass, w_j = omega_j^2,
+d_j = 2 zeta_j omega_j); the damper m, c, k stands on the degree of freedom where the mode
+shapes are a_j, and x_m is its stroke:
 
     eta_j'' + d_j eta_j' + w_j eta_j = a_j (k x_m + c x_m' - u) + forces
-    m (sum_j a_j eta_j'' + x_m'') + c x_m' + k x_m = u                   (2.19)
+    m (sum_j a_j eta_j'' + x_m'') + c x_m' + k x_m = u                   the thesis' (2.19)
 
-Eliminating eta gives one scalar equation for the eigenvalues (a secular equation, as
-in divide-and-conquer eigensolvers). With d_j(s) = s^2 + d_j s + w_j, e(s) = m s^2 + c s + k:
+Without eta there remains one scalar equation for the eigenvalues s, a secular equation as
+in divide-and-conquer eigensolvers. With d_j(s) = s^2 + d_j s + w_j, e(s) = m s^2 + c s + k:
 
     e(s) + m s^2 (c s + k) sum_j a_j^2 / d_j(s) = 0
 
-A root near the pole of mode i is found from its own, smooth form
+A root near the pole of mode i is found from a form that is smooth there:
 
     d_i(s) = r_i(s) = -a_i^2 m s^2 (c s + k) / (e(s) + m s^2 (c s + k) sum_{j/=i} a_j^2 / d_j(s))
 
-which gives the small number d_i(s) without cancellation; the eigenvector follows from
-the first equation. The matrices are symmetric, so left and right eigenvectors agree and
-no matrix is inverted:
+It gives the small number d_i(s) without cancellation; the eigenvector follows from the first
+equation. The matrices are symmetric, so left and right eigenvectors agree and no matrix is
+inverted:
 
     phi' (2 s M + C) phi = n,   z' = s z + phi' f / n,   x = sum of phi z over all s.
 
-Why not `scipy.linalg.eig`: it would be the same numbers, but this runs in a compiled
-kernel and so inside an exported FMU, whose damper and stiffness are set before
-initialisation. The tests compare both.
-
-All functions work on memory of the caller and allocate nothing.
+`scipy.linalg.eig` would give the same numbers, but this runs in a compiled kernel and so
+inside an exported FMU, whose damper and stiffness are set before initialisation. The tests
+compare both. All functions work on memory of the caller and allocate nothing.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ MAX_ITERATIONS = 60
 
 
 def _others(s: complex, skip: int, w: Array, d: Array, a: Array) -> tuple[complex, complex]:
-    """sum_j a_j^2/d_j(s) and its derivative, without the term `skip`."""
+    """Return sum_j a_j^2/d_j(s) and its derivative, without the term `skip`."""
     total = 0.0j
     slope = 0.0j
     for j in range(len(w)):
@@ -53,7 +52,7 @@ def _others(s: complex, skip: int, w: Array, d: Array, a: Array) -> tuple[comple
 def _residual(
     s: complex, i: int, w: Array, d: Array, a: Array, m: float, c: float, k: float
 ) -> tuple[complex, complex]:
-    """F(s) with F = 0 at an eigenvalue, and F'(s); i is the nearest pole or -1.
+    """Return F(s), which is 0 at an eigenvalue, and F'(s); i is the nearest pole or -1.
 
     F = d_i (e + q H) + q a_i^2 with q = m s^2 (c s + k); d_i = 1 and no last term for i = -1.
     """
@@ -82,7 +81,7 @@ def _root(
     roots: Array,
     count: int,
 ) -> complex:
-    """Newton with the roots found so far (and their conjugates) divided out."""
+    """Return a root by Newton's method, with the roots found so far and their conjugates divided out."""
     s = start
     for _ in range(MAX_ITERATIONS):
         F, dF = _residual(s, i, w, d, a, m, c, k)
@@ -105,9 +104,9 @@ def _root(
 def coupled_modes(
     w: Array, d: Array, a: Array, m: float, c: float, k: float, roots: Array, phi_re: Array, phi_im: Array
 ) -> int:
-    """Eigenvalues and scaled eigenvectors; returns their number, 0 if it failed.
+    """Write eigenvalues and scaled eigenvectors; return their number, 0 if an iteration failed.
 
-    w, d, a (n,): omega^2, 2 zeta omega and shape at the damper of the structure's modes.
+    w, d, a (n,): omega^2, 2 zeta omega and shape at the damper, by mode of the structure.
     roots (2n+2, 2): real and imaginary part, imaginary part >= 0.
     phi_re, phi_im (2n+2, n+1): eigenvector in (eta, x_m), scaled so that phi' (2 s M + C) phi = 1.
     A complex root stands for its pair; a real one for itself.

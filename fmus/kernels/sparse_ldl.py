@@ -2,14 +2,14 @@
 
     P A P^T = L D L^T,   L unit lower triangular
 
-The ordering P and the pattern of L are found once in Python (`plan`); what is
-left, `factor` and `solve`, is plain loops on caller-owned arrays, so that it runs
-inside a kernel. A is stored by the columns of its upper triangle (diagonal
-included), already permuted. A frame of 430 degrees of freedom has about 1,000
-entries in L: a solve is then an order of magnitude cheaper than with a dense inverse.
+The ordering P and the pattern of L are found once in Python (`plan`). `factor` and `solve`
+are plain loops on arrays of the caller, so that they run inside a kernel. A is stored by the
+columns of its upper triangle (diagonal included), already permuted. A frame of 430 degrees
+of freedom has about 1,000 entries in L: a solution is then an order of magnitude cheaper
+than with a dense inverse.
 
-The factorisation is the up-looking one of Davis, "Direct methods for sparse linear
-systems", chapter 4 (the elimination tree gives the pattern of each row of L).
+Source: T. A. Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, chapter 4 (the
+up-looking factorisation), DOI 10.1137/1.9780898718881.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Plan:
     parent: Array  # (n) elimination tree, -1 at a root
 
     def values(self, A: Array) -> Array:
-        """The entries of a matrix in the stored order."""
+        """Return the entries of a matrix in the stored order."""
         permuted = np.asarray(A, float)[np.ix_(self.order, self.order)]
         start = self.A_start.astype(int)
         column = np.repeat(np.arange(len(self.order)), np.diff(start))
@@ -44,7 +44,7 @@ class Plan:
 
 
 def plan(pattern: Array) -> Plan:
-    """Fill-reducing order and patterns for a symmetric matrix of this non-zero pattern."""
+    """Return a fill-reducing order and the patterns for a symmetric matrix with these non-zero entries."""
     n = len(pattern)
     filled = np.asarray(pattern, bool) | np.eye(n, dtype=bool)
     dominant = csc_matrix(filled.astype(float) + n * np.eye(n))
@@ -65,7 +65,7 @@ def plan(pattern: Array) -> Plan:
 
 
 def _elimination_tree(upper: csc_matrix) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Parent of every column, and the number of entries of every column of L."""
+    """Return the parent of each column, and the number of entries in each column of L."""
     n = upper.shape[0]
     parent = np.full(n, -1)
     counts = np.zeros(n, int)
@@ -97,7 +97,7 @@ def factor(
     path: Array,
     fill: Array,
 ) -> int:
-    """Numeric factorisation into row `level` of L and D_inv; 0, or 1 + the bad pivot.
+    """Factor A into row `level` of L and D_inv; return 0, or 1 + the pivot that is not positive.
 
     L_row (nnz) receives the rows of L, the same at every level. row, mark, path and
     fill (n each) are work space.
@@ -108,7 +108,7 @@ def factor(
         row[j] = 0.0
         fill[j] = L_start[j]
     for j in range(n):
-        # scatter column j, walk up the tree for the pattern of row j of L
+        # scatter column j; the way up the tree is the pattern of row j of L
         mark[j] = j
         top = n
         D = 0.0
@@ -147,7 +147,7 @@ def factor(
 
 
 def solve(L_start: Array, L_row: Array, L: Array, D_inv: Array, level: int, b: Array) -> None:
-    """b <- A^-1 b."""
+    """Overwrite b with A^-1 b."""
     n = b.shape[0]
     for j in range(n):
         y = b[j]
@@ -162,7 +162,7 @@ def solve(L_start: Array, L_row: Array, L: Array, D_inv: Array, level: int, b: A
 
 
 def symmetric_product(A_start: Array, A_row: Array, A: Array, x: Array, y: Array) -> None:
-    """y <- y + A x from the stored upper triangle."""
+    """Add A x to y, from the stored upper triangle."""
     for j in range(x.shape[0]):
         total = 0.0
         for p in range(int(A_start[j]), int(A_start[j + 1])):

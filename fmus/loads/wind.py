@@ -1,8 +1,7 @@
-"""Seeded across-wind load on a tower, by floor (default excitation of chapter 2).
+"""Seeded across-wind load on a tower, by floor.
 
-The wind tunnel record of the benchmark is not available. The force per metre of
-height is the sum of two stationary Gaussian processes, each given by its one-sided
-cross-spectral density S_ij(f) = sqrt(S_i(f) S_j(f)) R_ij:
+The force per metre of height is the sum of two stationary Gaussian processes, each given by
+its one-sided cross-spectral density S_ij(f) = sqrt(S_i(f) S_j(f)) R_ij:
 
     vortex shedding (Vickery and Clark, 1972)
         S_i = q_i^2 b^2 C_s^2 / (sqrt(pi) B f_i) exp(-((f/f_i - 1)/B)^2),  f_i = St U_i/b
@@ -11,17 +10,17 @@ cross-spectral density S_ij(f) = sqrt(S_i(f) S_j(f)) R_ij:
         S_i = q_i^2 b^2 C_t^2 4 T_i (1 + 188.4 n^2)/(1 + 70.7 n^2)^(11/6),  n = 2 f T_i, T_i = L/U_i
         R_ij = exp(-|z_i - z_j|/l_t)
 
-with the mean wind U_i = U_H (z_i/H)^alpha and q_i = rho U_i^2/2. Coherence does not
-depend on frequency, so a realisation is a root of R times independent processes: one
-inverse FFT of Gaussian numbers, seconds for 900 s on 76 floors, 5 MB.
+with the mean wind U_i = U_H (z_i/H)^alpha and q_i = rho U_i^2/2. Coherence does not depend
+on frequency, so a realisation is a root of R times independent processes: one inverse FFT of
+Gaussian numbers, which takes seconds for 900 s on 76 floors.
 
-The load is sampled every `sample_period` seconds and has zero mean; `FloorLoad` brings
-it into a system, linear between the samples.
+The load is sampled every `sample_period` seconds and has zero mean; `FloorLoad` feeds it to a
+system, linear between the samples. The defaults are those of the study of the tall building,
+which stands in for a wind tunnel record that is not available.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -30,16 +29,17 @@ import numpy as np
 import scipy.linalg as la
 
 from cosim import Array, Block, DeclarationError, Output, Parameter, RecordError
+from cosim.blocks.table_source import row_at
 
 
 @dataclass(frozen=True)
 class AcrossWind:
-    """Parameters of the load; the defaults are calibrated, see scenarios/_fit_wind.py."""
+    """Parameters of the load; the defaults are calibrated by the study of the tall building."""
 
     speed: float = 47.25  # U_H, mean wind at the top, m/s
     exponent: float = 0.25  # alpha of the profile
     breadth: float = 42.0  # b, m
-    density: float = 1.2  # rho, kg/m3
+    density: float = 1.2  # rho, kg/m^3
     strouhal: float = 0.06  # St
     bandwidth: float = 0.36  # B
     shedding: float = 0.3037  # C_s, RMS lift coefficient of shedding
@@ -50,24 +50,24 @@ class AcrossWind:
 
 
 def _shedding(wind: AcrossWind, f: Array, U: Array) -> Array:
-    """Spectral density for unit RMS, 1/Hz, (frequencies, floors)."""
+    """Return the spectral density for unit RMS, 1/Hz, (frequencies, floors)."""
     peak = wind.strouhal * U / wind.breadth
     x = (f[:, None] / peak - 1.0) / wind.bandwidth
     return np.asarray(np.exp(-(x**2)) / (np.sqrt(np.pi) * wind.bandwidth * peak))
 
 
 def _turbulence(wind: AcrossWind, f: Array, U: Array) -> Array:
-    """Spectral density for unit RMS, 1/Hz, (frequencies, floors)."""
+    """Return the spectral density for unit RMS, 1/Hz, (frequencies, floors)."""
     T = wind.turbulence_scale / U
     n2 = (2.0 * f[:, None] * T) ** 2
     return 4.0 * T * (1.0 + 188.4 * n2) / (1.0 + 70.7 * n2) ** (11.0 / 6.0)
 
 
 def coherence_factor(R: Array) -> Array:
-    """G = G' with G G = R for a positive semidefinite correlation matrix.
+    """Return G = G' with G G = R for a positive semidefinite correlation matrix.
 
-    The symmetric root, not Cholesky's or that of the eigenvectors: it is unique and smooth
-    in R, so that a small change of a parameter is a small change of the realisation.
+    The symmetric root is unique and smooth in R, unlike Cholesky's or that of the
+    eigenvectors: a small change of a parameter is a small change of the realisation.
     """
     values, vectors = la.eigh(R)
     if values[0] < -1e-8 * values[-1]:
@@ -82,9 +82,9 @@ def across_wind(
     wind: AcrossWind | None = None,
     sample_period: float = 0.1,
 ) -> Array:
-    """Forces on the floors, N, (samples, floors), at 0, sample_period, ... duration.
+    """Return the forces on the floors in N, (samples, floors), at 0, sample_period, ..., duration.
 
-    heights (floors,): story heights from the ground up, m. Same seed, same load.
+    heights (floors,): story heights from the ground up, m. The same seed gives the same load.
     """
     wind = wind or AcrossWind()
     if sample_period <= 0.0 or duration < sample_period:
@@ -116,23 +116,21 @@ def across_wind(
 
 
 class FloorLoad(Block):
-    """w(t) from a table of forces, linear between its samples, held until the block acts again."""
+    """w(t) from a table of forces: linear between its samples, held beyond its ends"""
 
     table = Parameter(0.0, "forces at 0, dt, 2 dt, ...", shape=("samples", "n"), unit="N", fixed=True)
     dt = Parameter(0.1, "sample period of the table", unit="s", min=1e-9, fixed=True)
     w = Output("forces on the floors", shape="n", unit="N")
 
     def step(self, t: float, h: float) -> None:
-        rows = self.table.shape[0]
-        q = min(max(t / self.dt, 0.0), rows - 1.0)  # before its start and after its end the table is held
-        i = max(min(math.floor(q + 1e-9), rows - 2), 0)
-        after = min(i + 1, rows - 1)
+        i, q = row_at(t, self.dt, self.table.shape[0])
+        after = min(i + 1, self.table.shape[0] - 1)
         for j in range(self.w.shape[0]):
-            self.w[j] = self.table[i, j] + (q - i) * (self.table[after, j] - self.table[i, j])
+            self.w[j] = self.table[i, j] + q * (self.table[after, j] - self.table[i, j])
 
 
 def load_forces(path: str | PathLike[str], floors: int) -> tuple[Array, float]:
-    """Forces (samples, floors) in N and their sample period in s, from a user's file.
+    """Read forces (samples, floors) in N and their sample period in s from a file.
 
     .npz with arrays `time` (samples,) in s and `force` (samples, floors) in N; or .csv with
     the columns time, force on floor 1, 2, ... (one line of titles is allowed).
@@ -152,12 +150,12 @@ def load_forces(path: str | PathLike[str], floors: int) -> tuple[Array, float]:
             time, force = columns[:, 0], columns[:, 1:]
     except (OSError, ValueError) as error:
         raise RecordError(
-            f"{path} is no record of forces: {error}; give .npz or .csv, see `load_forces`"
+            f"{path} is not a record of forces ({error}); give .npz or .csv as `load_forces` describes them"
         ) from error
     if force.ndim != 2 or force.shape != (len(time), floors) or len(time) < 2:
         raise RecordError(
             f"{path}: forces of shape {force.shape} for {len(time)} times; the building needs "
-            f"({len(time)}, {floors}), two samples at least"
+            f"({len(time)}, {floors}) with at least two samples"
         )
     if not (np.isfinite(time).all() and np.isfinite(force).all()):
         row = int(np.argmin(np.isfinite(time) & np.isfinite(force).all(axis=1)))

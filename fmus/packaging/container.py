@@ -1,18 +1,18 @@
-"""A whole system as one FMU: `export_container(system, "loop.fmu", step=0.01)`.
+"""Export of a system as one FMU: `export_container(system, "loop.fmu", step=0.01)`.
 
 The FMUs of the participants and their connections go into a container of
 fmu-manipulation-toolbox (`pip install structcosim[container]`), which steps them in C. Its
 steps are those of sampled coupling: in [t_k, t_{k+1}] it steps one FMU after the other, each
-with what the others gave last. So blocks come first, in the order of their connections, and
-read what plants have at t_k; then the plants, each before what it drives, so that all of them
-get the values of t_k or of blocks. Unit conversions and late connections are small FMUs of
-their own on the way.
+with the last values of the others. So blocks come first, in the order of their connections,
+and read the plants' outputs at t_k; then the plants, each before those that drive it, so that
+all of them get values of t_k or of blocks. Unit conversions and late connections are small
+FMUs of their own.
 
-Variables are named `participant.variable`: all outputs, parameters, and the inputs that nothing
-feeds. At t_k an output of a plant is that at t_k, an output of a block is that at t_{k-1},
-which it computed last. One thing differs, at t_0: there a plant's inputs are already what feeds
-them has after initialization, while in `simulate` they have their own start values until the
-first step; it shows in outputs with feedthrough at t_0 if the two are not the same.
+Variables are named `participant.variable`: all outputs, parameters, and the inputs that are not
+connected. At t_k the output of a plant is that at t_k; the output of a block is that at t_{k-1},
+from its last step. One thing differs from `simulate`, at t_0: an input of a plant has the value
+that its source has after initialisation, while in `simulate` it has its own start value until
+the first step. Outputs with feedthrough show it at t_0 if the two differ.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def _with_conversions(system: System) -> tuple[System, list[str]]:
 
 def _check(system: System, step: float) -> None:
     for texts in system.text_connections:
-        raise ExportError(f"{texts.source} -> {texts.target} is text, which a container does not connect")
+        raise ExportError(f"{texts.source} -> {texts.target} carries text, which a container cannot connect")
     for name, member in system.participants.items():
         if member.as_block:
             period = member.sample_period or (member.every or 1) * step
@@ -140,11 +140,13 @@ def _check(system: System, step: float) -> None:
                     "export it with this step, or as an SSP"
                 )
         if isinstance(member, FMU) and member.model_exchange:
-            raise ExportError(f"{name} is Model Exchange, which a container would integrate by other means")
+            raise ExportError(
+                f"{name} is for Model Exchange, which a container would integrate by another method"
+            )
 
 
 def _order(system: System, blocks: list[str]) -> list[str]:
-    """Return the participants as they are stepped: blocks, then each plant before those that drive it."""
+    """Return the participants in the order of steps: blocks, then each plant before those that drive it."""
     plants = [n for n in system.participants if n not in blocks]
     first: dict[str, set[str]] = {name: set() for name in plants}
     for c in system.connections:
@@ -156,7 +158,7 @@ def _order(system: System, blocks: list[str]) -> list[str]:
     except CycleError as error:
         names = " and ".join(dict.fromkeys(error.args[1]))
         raise ExportError(
-            f"{names} drive each other: in a container the one that is stepped last would get values of "
+            f"{names} drive each other; in a container the one that is stepped last would get values of "
             "t_k+1, not of t_k; export the system as an SSP"
         ) from None
 
@@ -219,7 +221,7 @@ def _wire(container: Any, system: System, parts: dict[str, Part]) -> None:
 
 
 def _pairs(c: Connection, parts: dict[str, Part]) -> Iterator[tuple[str, str]]:
-    """Yield what is linked: elements, or whole arrays of FMI 3.0, of which no part can be linked."""
+    """Yield the links of a connection: elements, or whole arrays of FMI 3.0, which cannot be divided."""
     sources, targets = (_names(end, parts[end.participant].ports[end.name]) for end in (c.source, c.target))
     if len(sources) == 1 and len(targets) > 1 and c.source.count == 1:
         sources = sources * len(targets)
@@ -237,7 +239,7 @@ def _names(end: Port, port: FMUPort) -> list[str]:
 
 
 def _described(text: bytes, parts: dict[str, Part]) -> bytes:
-    """Return modelDescription.xml with what the toolbox leaves out or makes up.
+    """Return modelDescription.xml without the gaps and mistakes that the toolbox leaves.
 
     Units; initial unknowns without exact ones, as FMI has it; no author, license or time of its own.
     """

@@ -1,4 +1,4 @@
-"""The participants of a system as FMU files: what a package of any kind (SSP, container) is made of."""
+"""The participants of a system as FMU files, for packages of any kind (SSP, container)."""
 
 from __future__ import annotations
 

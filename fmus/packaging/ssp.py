@@ -1,4 +1,4 @@
-"""A system leaves as an SSP: `export_ssp(system, "loop.ssp", step=0.01, stop=20.0)`.
+"""Export of a system as an SSP: `export_ssp(system, "loop.ssp", step=0.01, stop=20.0)`.
 
     resources/NAME.fmu       every participant: an FMU is copied, a Block or Continuous exported
     SystemStructure.ssd      connectors, connections, parameter values (SSV, in place), units
@@ -82,9 +82,9 @@ def export_ssp(
         names of `fmus.link.PLATFORMS` for these FMUs; this machine's by default
     """
     if version is not None and version not in VERSIONS:
-        raise SSPError(f"no SSP version '{version}'; choose from {', '.join(VERSIONS)}")
+        raise SSPError(f"SSP version '{version}' is not supported; choose from {', '.join(VERSIONS)}")
     if not system.participants:
-        raise SSPError("a system without participants has nothing to export")
+        raise SSPError("the system has no participants; add some before it is exported")
     fmi_version = fmi_version or ("3.0" if version == "2.0" else "2.0")
     wanted = None if platforms is None else list(platforms)
     parts = fmu_parts(system, fmi_version, wanted)
@@ -107,7 +107,7 @@ def _connections(system: System) -> list[Connection]:
 
 
 def _needs_2(system: System, parts: dict[str, Part]) -> str:
-    """Return what SSP 1.0 has no words for, as the end of a sentence; nothing if it has."""
+    """Return the first thing that SSP 1.0 cannot express, as the end of a sentence, or nothing."""
     for c in _connections(system):
         for end in (c.source, c.target):
             port = parts[end.participant].ports[end.name]
@@ -207,7 +207,7 @@ class _Writer:
                 _add(connector, SSC, "Dimension", size=str(n))
 
     def _parameters(self, component: etree._Element, part: Part) -> None:
-        """Write the parameter set of a component: parameters of ours, start values of an FMU."""
+        """Write the parameter set of a component: parameters of a participant, start values of an FMU."""
         values = _values(part)
         if not values:
             return
@@ -328,7 +328,7 @@ def _annotate(notes: etree._Element, name: str, facts: dict[str, str]) -> None:
 
 
 def _facts(member: Component) -> dict[str, str]:
-    """Return what the standard does not say of a participant: our annotation."""
+    """Return our annotation of a participant, for what the standard does not express."""
     facts: dict[str, str] = {}
     if member.as_block:
         facts["kind"] = "block"

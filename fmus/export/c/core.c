@@ -16,7 +16,7 @@
 #define ANY (BEFORE_INITIALIZATION | READABLE)
 
 #define SELDOM __attribute__((noinline, cold))
-/* Before loops over a handful of ports: vector code would cost more than it saves. */
+/* For loops over a few ports, where vector code costs more than it saves. */
 #define PLAIN_LOOP _Pragma("clang loop vectorize(disable) unroll(disable)")
 
 static const unsigned legal[OPERATIONS] = {
@@ -67,7 +67,7 @@ static const char *mode_name(enum mode mode) {
     case TERMINATED: return "terminated";
     case BROKEN: return "stopped by an error (reset it or restore a state)";
     }
-    return "no known mode";
+    return "an unknown mode";
 }
 
 /* --- log ------------------------------------------------------------------------------------ */
@@ -281,7 +281,7 @@ const struct variable *core_locate(uint32_t slot) {
         else high = middle;
     }
     const struct variable *v = &model.variables[low];
-    return slot - v->first < v->size ? v : NULL; /* no slot before the first variable */
+    return slot - v->first < v->size ? v : NULL; /* also NULL before the first variable */
 }
 
 void core_slot_name(uint32_t slot, char *text, size_t size) {
@@ -458,14 +458,14 @@ status core_get_zone(struct instance *c, enum zone zone, double *x, size_t n, co
 status core_step(struct instance *c, double t, double h, const char *function) {
     if (!isfinite(t) || !isfinite(h)) return core_refuse(c, function, "t = %g, step = %g: not finite", t, h);
     if (!(h > 0.0)) return core_refuse(c, function, "step %g is not positive", h);
-    /* A hundredth of a step, or rounding of t on the host's side: more is another time. */
+    /* A hundredth of a step, and the rounding of t by the host; beyond that it is another time. */
     double slack = 0.01 * h + 2.0 * DBL_EPSILON * fabs(t);
     if (fabs(t - c->t) > slack)
         return core_refuse(c, function, "step from t = %.17g, but the instance is at %.17g", t, c->t);
     if (t + h > c->stop_time + slack)
         return core_refuse(c, function, "step to %.17g passes the stop time %.17g", t + h, c->stop_time);
     /* Hosts compute h as a difference of times: the same step comes with other last bits. Models keep
-       what belongs to a step (matrix exponentials), so a difference within rounding of t is none. */
+       matrices that belong to a step, so a difference within rounding of t does not count. */
     if (fabs(h - c->step) > 8.0 * DBL_EPSILON * (fabs(t) + h)) c->step = h;
     model_kernel *kernel = model.step ? model.step : model.advance;
     int32_t code = kernel ? kernel(c->record, t, c->step) : 0;

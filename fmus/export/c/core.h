@@ -5,12 +5,12 @@
    - OK:      done.
    - FAILED:  one line went to the log. Either the call was refused and changed
               nothing (wrong argument, wrong moment), or the model itself failed
-              (kernel gave up, result not finite) and the instance is in BROKEN:
+              (a kernel failed, a result is not finite) and the instance is in BROKEN:
               it can still be read, reset, restored from a snapshot and freed.
-   Time belongs to the host: t is what the host passed last, never a running sum.
+   Time belongs to the host: t is the last time that the host passed, never a running sum.
 
-   No function here has memory beyond its instance: any number of instances can
-   live in a process, each in its own thread. */
+   No function keeps anything outside its instance: a process can have any number of
+   instances, each in a thread of its own. */
 
 #ifndef STRUCTCOSIM_CORE_H
 #define STRUCTCOSIM_CORE_H
@@ -34,7 +34,7 @@ enum mode {
     BROKEN = 1 << 7
 };
 
-/* Everything whose legality depends on the mode: rows of a table in core.c. */
+/* Operations whose legality depends on the mode: rows of a table in core.c. */
 enum operation {
     SET_LOGGING,
     PREPARE,
@@ -59,7 +59,7 @@ enum operation {
     GET_DERIVATIVES,
     DO_STEP,
     STEP_STATUS,
-    NEVER, /* what needs event mode in Co-Simulation, configuration mode or clocks */
+    NEVER, /* functions for event mode in Co-Simulation, configuration mode or clocks */
     OPERATIONS
 };
 
@@ -95,7 +95,7 @@ void core_free(struct instance *);
 status core_set_logging(struct instance *, bool on, size_t n, const char *const categories[],
                         const char *function);
 
-/* True when `operation` is legal now; otherwise one line in the log (none for NULL). */
+/* True when `operation` is legal now; otherwise writes one line to the log (none for NULL). */
 bool core_allows(struct instance *, enum operation, const char *function);
 
 /* One line in the log, "function: ...", and FAILED. */
@@ -153,7 +153,7 @@ status core_differentiate(struct instance *, struct direction unknown, struct di
 int32_t core_run(double *record, double t);
 /* The variable that owns a slot; NULL beyond the record. */
 const struct variable *core_locate(uint32_t slot);
-/* Number of slots that a reference stands for; 0 and no matter which variable when it is unknown. */
+/* Number of slots of a reference, and its variable; 0 and any variable when it is unknown. */
 uint32_t core_extent(uint32_t reference, bool whole, const struct variable **variable);
 /* First slot in [first, last) that is not finite, or `last`. */
 uint32_t core_first_not_finite(const double *record, uint32_t first, uint32_t last);

@@ -7,7 +7,7 @@
 
 #include "fmi2Functions.h"
 
-/* Enters a function: legal now? Leaves it with fmi2Error if not (no log line for a NULL component). */
+/* Returns fmi2Error from a function that is not legal now; a NULL component gets no log line. */
 #define ENTER(operation)                                                                           \
     struct instance *self = c;                                                                     \
     if (!core_allows(self, operation, __func__)) return fmi2Error
@@ -89,7 +89,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     DONE(core_set(self, vr, n, value, n, false, __func__));
 }
 
-/* All variables are Real: of other types there are none to get or set. */
+/* All variables are Real; there are none of other types to get or set. */
 #define NO_VARIABLES(type, get, set)                                                               \
     fmi2Status get(fmi2Component c, const fmi2ValueReference vr[], size_t n, type value[]) {       \
         (void)vr, (void)value;                                                                     \
@@ -262,7 +262,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
     return fmi2OK;
 }
 
-/* The other kinds of status are those of a pending step. */
+/* The other kinds of status belong to a pending step, which there never is. */
 #define NO_STATUS(type, get)                                                                       \
     fmi2Status get(fmi2Component c, const fmi2StatusKind kind, type *value) {                      \
         (void)value;                                                                               \

@@ -5,7 +5,7 @@
 
 #include "fmi3Functions.h"
 
-/* Enters a function: legal now? Leaves it with fmi3Error if not (no log line for a NULL instance). */
+/* Returns fmi3Error from a function that is not legal now; a NULL instance gets no log line. */
 #define ENTER(operation)                                                                           \
     struct instance *self = c;                                                                     \
     if (!core_allows(self, operation, __func__)) return fmi3Error
@@ -43,7 +43,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     struct instance *self =
         core_new(name, token, CO_SIMULATION, logging, sink, (void (*)(void))log, environment);
     if (self && event_mode) {
-        self->log_errors = true; /* NULL says nothing */
+        self->log_errors = true; /* the NULL that follows gives no reason */
         core_refuse(self, __func__, "event mode is not there (hasEventMode is false)");
         core_free(self);
         return NULL;
@@ -109,7 +109,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     DONE(core_set(self, vr, n, values, n_values, true, __func__));
 }
 
-/* All variables are Float64: of other types there are none to get or set. */
+/* All variables are Float64; there are none of other types to get or set. */
 #define NOTHING(operation)                                                                         \
     (void)vr, (void)values, (void)n_values;                                                        \
     ENTER(operation);                                                                              \

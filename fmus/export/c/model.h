@@ -1,8 +1,9 @@
 /* The contract between an exported model and the FMI front end.
 
    A model is one record of `n_slots` doubles in contiguous memory and up to five
-   kernels that read and write it. (Slots behind the last zone are the kernels' own.) `fmus/link.py` writes one C file per model that
-   defines `model`; nothing else in the front end knows which model it serves.
+   kernels that read and write it (slots behind the last zone belong to the kernels alone).
+   `fmus/export/link.py` writes one C file for each model, which defines `model`; no other part
+   of the front end knows which model it serves.
 
    The record is a sequence of zones, in this order:
        inputs | outputs | states | derivatives | locals | parameters
@@ -16,7 +17,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* 0 = done; any other value = the kernel gave up, the record is void. */
+/* 0: done. Any other value: the kernel failed, and the record is not valid. */
 typedef int32_t model_kernel(double *record, double t, double h);
 
 enum zone { INPUT, OUTPUT, STATE, DERIVATIVE, LOCAL, PARAMETER, ZONES };
@@ -28,7 +29,7 @@ struct variable {
     uint32_t first; /* first slot */
     uint32_t size;  /* number of slots, at least 1 */
     uint8_t zone;   /* enum zone */
-    bool listed;    /* stands in the modelDescription; others have no value reference */
+    bool listed;    /* is in the modelDescription; others have no value reference */
     double min, max;
 };
 

@@ -217,13 +217,17 @@ class Interpreted(Block):
 @pytest.mark.parametrize(
     ("participant", "options", "says"),
     [
-        (building, {"platforms": ["sparc-solaris"]}, "no platform 'sparc-solaris'; choose from x86_64-linux"),
+        (
+            building,
+            {"platforms": ["sparc-solaris"]},
+            "platform 'sparc-solaris' is not known; choose from x86_64-linux",
+        ),
         (building, {"platforms": []}, "at least one"),
-        (building, {"fmi_version": "1.0"}, "no FMI version '1.0'"),
-        (building, {"experiment": DefaultExperiment(0.0, 1.0, -0.1)}, "step above zero"),
+        (building, {"fmi_version": "1.0"}, "FMI version '1.0' is not supported"),
+        (building, {"experiment": DefaultExperiment(0.0, 1.0, -0.1)}, "step must be above zero"),
         (building, {"interfaces": ["ScheduledExecution"]}, "no interface 'ScheduledExecution'"),
-        (building, {"interfaces": []}, "needs an interface"),
-        (lambda: Accumulator(m=2, n=3), {"interfaces": ["ModelExchange"]}, "it has CoSimulation"),
+        (building, {"interfaces": []}, "interfaces is empty"),
+        (lambda: Accumulator(m=2, n=3), {"interfaces": ["ModelExchange"]}, "choose from CoSimulation"),
         (Interpreted, {}, "compiled = False"),
     ],
 )

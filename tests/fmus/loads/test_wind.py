@@ -127,7 +127,7 @@ def test_bad_records_are_refused_with_a_reason(tmp_path: Path) -> None:
         np.savez(tmp_path / f"{name}.npz", **arrays)
         with pytest.raises(RecordError, match=message):
             load_forces(tmp_path / f"{name}.npz", 3)
-    with pytest.raises(RecordError, match="no record of forces"):
+    with pytest.raises(RecordError, match="not a record of forces"):
         load_forces(tmp_path / "missing.csv", 3)
     with pytest.raises(CosimError, match="must be"):
         across_wind(STORY_HEIGHTS, 10.0, sample_period=0.0)

@@ -149,9 +149,9 @@ class Interpreted(Block):
 def test_what_cannot_leave_is_an_error_that_names_it(tmp_path):
     with pytest.raises(CosimError, match="participant odd: Interpreted runs as Python"):
         export_ssp(System({"odd": Interpreted()}), tmp_path / "a.ssp")
-    with pytest.raises(SSPError, match=r"no SSP version '3\.0'"):
+    with pytest.raises(SSPError, match=r"SSP version '3\.0' is not supported"):
         export_ssp(loop(), tmp_path / "a.ssp", version="3.0")
-    with pytest.raises(SSPError, match="without participants"):
+    with pytest.raises(SSPError, match="has no participants"):
         export_ssp(System(), tmp_path / "a.ssp")
 
 
