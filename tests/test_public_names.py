@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
 import cosim
+from tests.readme import ROOT
 
-ROOT = Path(__file__).parents[1]
 #: what studies and controllers may import of cosim, and by which names README does
 PUBLIC = {"cosim", "cosim.blocks", "cosim.functions"}
-#: imports that the study's file loses when its start values come from the command line's own parser
-KNOWN = {("scenarios/external_plant.py", "cosim.cli.fmu_scenario")}
 
 
 def imported(text: str) -> set[str]:
@@ -36,12 +33,14 @@ def test_studies_and_controllers_import_from_public_rooms():
         for file in files
         for name in imported(file.read_text(encoding="utf-8")) - PUBLIC
     }
-    assert private <= KNOWN
+    assert private == set()
 
 
-@pytest.mark.parametrize("document", ["README.md"])
-def test_documents_import_from_public_rooms(document):
-    scripts = re.findall(r"```python\n(.*?)```", (ROOT / document).read_text(encoding="utf-8"), re.DOTALL)
+@pytest.mark.parametrize("folder", ["", "cosim", "fmus", "controllers", "scenarios"])
+def test_documents_import_from_public_rooms(folder):
+    scripts = re.findall(
+        r"```python\n(.*?)```", (ROOT / folder / "README.md").read_text(encoding="utf-8"), re.DOTALL
+    )
     assert scripts
     for script in scripts:
         assert imported(script) <= PUBLIC

@@ -1,38 +1,36 @@
-"""The README's scripts run as they stand there."""
+"""The scripts of README.md and cosim/README.md run as they stand there."""
+
+from __future__ import annotations
 
 import re
-import subprocess
-import sys
-from pathlib import Path
 
-README = Path(__file__).parents[1] / "README.md"
+import pytest
 
-
-def script_after(words: str) -> str:
-    return re.search(r"```python\n(.*?)```", README.read_text().split(words)[1], re.S)[1]
+from tests.readme import ROOT, code_blocks, run
 
 
-def run(script: str, folder: Path) -> list[str]:
-    (folder / "script.py").write_text(script)
-    done = subprocess.run(
-        [sys.executable, "script.py"], cwd=folder, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
-
-
-def test_the_smallest_script_runs(tmp_path):
-    numbers, *schedule = run(script_after("## The smallest script"), tmp_path)
-    # braked by 0.8 N s/m, 2 kg started at 25 m/s from 14 m: 14 + 25 * 2 / 0.8 = 76.5 m without the weak
-    # spring, which has pulled it back a little after 20 s
-    position, peak = map(float, numbers.split())
-    assert 60.0 < position < 76.5
-    assert peak == 0.8 * 25.0
+def test_the_building_of_the_readme(tmp_path):
+    """The brace lowers the drift; without it there is no force. The schedule says what is an FMU."""
+    (script,) = code_blocks(ROOT / "README.md")
+    free, braced, *schedule = run(script, tmp_path)
+    drift = [float(line.partition("drift ")[2].partition(" mm")[0]) for line in (free, braced)]
+    assert free.endswith("force 0 kN")
+    assert 0.7 * drift[0] < drift[1] < 0.9 * drift[0]
     assert schedule[0] == "sampled coupling"
+    assert "  building: step (FMU)" in schedule
 
 
-def test_the_script_that_branches_a_run_runs(tmp_path):
-    """After the smallest script, with its system: the branch repeats what the restored run did."""
-    script = script_after("## The smallest script") + script_after("A run can be carried on")
-    lines = run(script + "print((strong['plant.x'] == again['plant.x']).all(), len(again.time))", tmp_path)
-    assert lines[-1] == "True 501"
+def test_the_branch_of_a_run_repeats_it(tmp_path):
+    """The second script of cosim/README.md uses the class of the first one."""
+    oscillator, branch = code_blocks(ROOT / "cosim" / "README.md")
+    assert run(f"{oscillator}\n{branch}", tmp_path)[-1] == "True"
+
+
+def test_the_readme_fits_a_page():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+@pytest.mark.parametrize("document", sorted(p for p in ROOT.rglob("README.md") if ".venv" not in p.parts))
+def test_links_lead_somewhere(document):
+    links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8"))
+    assert [link for link in links if "://" not in link and not (document.parent / link).exists()] == []

@@ -1,1 +1,1 @@
-"""The pictures of the README, and the code that draws them."""
+"""The pictures of the READMEs, and the code that draws them."""

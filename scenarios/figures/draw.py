@@ -1,5 +1,6 @@
-"""Draw the pictures of the README: `python -m scenarios.figures.draw [FOLDER]`.
+"""Draw the pictures of the READMEs: `python -m scenarios.figures.draw [FOLDER]`.
 
+building.png: loop and response of a building with an active brace (building.py).
 chattering.png: phase plane of chapter 4, case 2, with the constant gain beside Algorithm I.
 """
 
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 
 from cosim import Result
 from scenarios.chattering.study import CASES, Study
+from scenarios.figures.building import building
 
 HERE = Path(__file__).parent
 TRAJECTORY, SURFACE, MARK = "#0b5394", "#d55e00", "#222222"
@@ -54,6 +56,7 @@ def _phase_plane(axes: Axes, result: Result, title: str) -> None:
 def main(folder: Path = HERE) -> None:
     """Draw all pictures into a folder."""
     matplotlib.use("Agg")
+    building().savefig(folder / "building.png", dpi=300)
     chattering().savefig(folder / "chattering.png", dpi=300)
 
 
