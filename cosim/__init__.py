@@ -17,6 +17,7 @@ from .errors import (
     WiringError,
 )
 from .fmi.fmu import FMU
+from .fmi.interfaces import CoSimulation, ModelExchange
 from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
 from .result import Interrupted, Result, SimulationError, Statistics
 from .run.master import schedule, simulate
@@ -30,6 +31,7 @@ __all__ = [
     "FMU",
     "Array",
     "Block",
+    "CoSimulation",
     "CompilationError",
     "Continuous",
     "CosimError",
@@ -40,6 +42,7 @@ __all__ = [
     "Interrupted",
     "LinearContinuous",
     "Local",
+    "ModelExchange",
     "Output",
     "Parameter",
     "Participant",

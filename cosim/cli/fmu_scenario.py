@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import FMUError, TimeError, did_you_mean
 from ..fmi.file.display_units import has_unit
-from ..fmi.fmu import FMU, Interface, Solver
+from ..fmi.fmu import FMU
+from ..fmi.interfaces import InterfaceName, Solver, interface_of
 from ..result import Result
 from ..run.master import simulate
 from ..system.system import System
@@ -29,9 +30,9 @@ def fmu_scenario(path: Path) -> Scenario:
 
     def build(
         *,
-        interface: Interface | None = None,
+        interface: InterfaceName | None = None,
         solver: Solver | None = None,
-        substeps: int = 1,
+        substeps: int | None = None,
         tolerance: float | None = None,
         event_mode: bool | None = None,
         isolated: bool = False,
@@ -42,11 +43,14 @@ def fmu_scenario(path: Path) -> Scenario:
         fmu = FMU(
             path,
             start=values,
-            interface=interface,
-            solver=solver,
-            substeps=substeps,
-            tolerance=tolerance,
-            event_mode=event_mode,
+            interface=interface_of(
+                path.name,
+                interface,
+                solver=solver,
+                substeps=substeps,
+                tolerance=tolerance,
+                event_mode=event_mode,
+            ),
             isolated=isolated,
         )
         system = System({name: fmu})
@@ -59,9 +63,9 @@ def fmu_scenario(path: Path) -> Scenario:
         stop: float | None = None,
         step: float | None = None,
         start_time: float | None = None,
-        interface: Interface | None = None,
+        interface: InterfaceName | None = None,
         solver: Solver | None = None,
-        substeps: int = 1,
+        substeps: int | None = None,
         tolerance: float | None = None,
         event_mode: bool | None = None,
         isolated: bool = False,
@@ -85,7 +89,7 @@ def fmu_scenario(path: Path) -> Scenario:
         solver
             of Model Exchange: ode1 to ode4, cvode [ode4; cvode if there are event indicators]
         substeps
-            steps of ode1 to ode4 in a communication step
+            steps of ode1 to ode4 in a communication step [1]
         tolerance
             relative tolerance of cvode [1e-6]
         event_mode

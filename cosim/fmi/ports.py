@@ -1,7 +1,7 @@
-"""Ports of an FMU: what its variables are to a system.
+"""Ports of an FMU, made from its variables.
 
 An array variable of FMI 3.0 is a port. Scalar variables that are the elements of one
-array (`accel[1]`, `accel[2]`, ...; all there is in FMI 2.0) are joined to one.
+array (`accel[1]`, `accel[2]`, ..., as FMI 2.0 has them) are joined to one port.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class FMUPort:
 
     @property
     def relative(self) -> bool:
-        """Tell whether it is a difference, whose unit has no offset."""
+        """Return whether it is a difference, whose unit has no offset."""
         v = self.variables[0]
         own = v.relativeQuantity
         return bool(own if own is not None or v.declaredType is None else v.declaredType.relativeQuantity)
@@ -106,6 +106,20 @@ def display_unit_of(variable: Any) -> str | None:
     declared = variable.declaredType
     unit = variable.displayUnit or (declared.displayUnit if declared is not None else None)
     return str(unit) if unit else None
+
+
+def shape_of(variable: Any, start: Mapping[str, Any]) -> Shape:
+    """Return the shape of a variable: fixed dimensions, or those of structural parameters."""
+    sizes = []
+    for d in variable.dimensions:
+        size = d.start if d.start is not None else start.get(d.variable.name, d.variable.start)
+        try:
+            sizes.append(int(size))
+        except (TypeError, ValueError):
+            raise FMUError(
+                f"{variable.name}: its dimension {d.variable.name} = {size!r} must be a whole number"
+            ) from None
+    return tuple(sizes)
 
 
 def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[str, FMUPort]:

@@ -17,7 +17,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import groupby
 from typing import Any, TypeAlias
-from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -46,10 +45,6 @@ Instance: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInsta
 Integrated: TypeAlias = KernelInstance | ModelExchangeInstance
 
 
-#: who has FMUs that can be there once only, by token
-_ALONE: WeakValueDictionary[str, Program] = WeakValueDictionary()
-
-
 class Program:
     """The table of operations of one run, and the instances that it works on."""
 
@@ -70,7 +65,6 @@ class Program:
         self.h = h
         self.failures = Failures()
         self.instances: dict[str, Instance] = {}
-        self._alone: dict[str, str] = {}  # FMUs that can be there once only, by token
         self.buffers: list[Array] = []
         self.callbacks: list[Any] = []
         self.iteration: IteratedCoupling | None = None
@@ -114,63 +108,8 @@ class Program:
                     'which stage coupling integrates; use coupling="sampled"'
                 )
             return KernelInstance(name, member, jit, self.failures)  # type: ignore[arg-type]
-        if stage and member.as_block and (member.every, member.sample_period) == (None, None):
-            raise WiringError(
-                f"{name} ({member.path.name}) stands for a block at every stage of the solver, and an FMU "
-                "steps at communication points only; give it sample_period= or every=1, "
-                'or use coupling="sampled"'
-            )
-        if stage and not member.as_block:
-            self._check_stage(name, member)
-        model_exchange = (stage and not member.as_block) or member.model_exchange
-        if not member.isolated:
-            self._check_alone(name, member, model_exchange)
-        if model_exchange:
-            return ModelExchangeInstance(name, member, self.failures, used)
         step = self.h * ((self._rate(name) or 1) if member.as_block else 1)
-        return CoSimulationInstance(name, member, self.failures, used, step)
-
-    def _check_stage(self, name: str, fmu: FMU) -> None:
-        where = f"{name} ({fmu.path.name})"
-        if not fmu.has_me:
-            raise WiringError(
-                f"{where} has no Model Exchange, which stage coupling needs; "
-                'use coupling="sampled" or export it with Model Exchange'
-            )
-        if fmu.clocks:
-            raise WiringError(
-                f"{where} has clocks, which tick at communication points, and stage coupling has stages "
-                'between them; use coupling="sampled"'
-            )
-        if fmu.interface == "CoSimulation":
-            raise WiringError(
-                f'{where} is to be used with interface="CoSimulation", and stage coupling needs Model '
-                'Exchange; leave interface away, or use coupling="sampled"'
-            )
-        if fmu.solver is not None or fmu.substeps != 1:
-            raise WiringError(
-                f"{where} has a solver of its own, and stage coupling integrates all participants "
-                "together, by simulate(solver=); leave solver and substeps of the FMU away, "
-                'or use coupling="sampled"'
-            )
-
-    def _check_alone(self, name: str, fmu: FMU, model_exchange: bool) -> None:
-        description = fmu.description
-        interface = description.modelExchange if model_exchange else description.coSimulation
-        other = self._alone.get(description.guid)
-        if other is not None:
-            raise WiringError(
-                f"{name} and {other} are the same FMU, {fmu.path.name}, which can be instantiated only once "
-                "per process; run each in a process of its own, FMU(..., isolated=True)"
-            )
-        if interface.canBeInstantiatedOnlyOncePerProcess:
-            if description.guid in _ALONE:
-                raise WiringError(
-                    f"{name} ({fmu.path.name}) can be instantiated only once per process, and a simulation "
-                    "that is open has it; close that first, or say FMU(..., isolated=True)"
-                )
-            self._alone[description.guid] = name
-            _ALONE[description.guid] = self
+        return member.instance(name, self.failures, used, step, stage)
 
     def _rate(self, name: str) -> int | None:
         """Return every how many steps a block acts; None when it follows the coupling."""
@@ -181,10 +120,7 @@ class Program:
 
     def close(self) -> list[str]:
         """Free the FMU instances; return what isolated ones crashed in that, and how."""
-        crashes = [crash for instance in self.instances.values() if (crash := instance.stop())]
-        for token in self._alone:
-            _ALONE.pop(token, None)
-        return crashes
+        return [crash for instance in self.instances.values() if (crash := instance.stop())]
 
     def _is_block(self, name: str) -> bool:
         return self.system.participants[name].as_block

@@ -343,9 +343,7 @@ class Simulation:
             other.restore(snapshot)
         except SimulationError as error:
             instances = other._program.instances
-            crashed = ", ".join(
-                n for n, i in instances.items() if isinstance(i, FMUInstance) and i.fmi.is_gone
-            )
+            crashed = ", ".join(n for n, i in instances.items() if isinstance(i, FMUInstance) and i.is_gone)
             other.close()
             if not crashed:
                 raise

@@ -1,39 +1,41 @@
-"""A running FMU with Co-Simulation: doStep, and what interrupts it.
+"""A running FMU with Co-Simulation: doStep, and the events that interrupt it.
 
-A step of FMI 3.0 that comes back early at t' is continued from there until t_{k+1}. In
-event mode an event that ended it is handled at t', a time event that falls into the step
-splits it, and discrete inputs that changed are set at t_k. All of this is Python, which
-the loop enters only when there is something to do.
+A step of FMI 3.0 that returns early is continued, events are handled at their instants in event
+mode, and discrete inputs that changed are set at t_k (driver.py). All of this is Python, which
+the loop enters only if a step was interrupted.
 """
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import replace
 from typing import Any
 
-from ...errors import FMUError
 from ...loop.operations import SLACK, Op
 from ...loop.signals import Failures
 from ...result import SimulationError
-from ..clocks import Timers
-from ..fmu import FMU
-from .adapter import StepAnswer
-from .events import EVENT_ITERATIONS, EventInstance
-
-_DISCARD = 2
+from ..fmu_file import FMUFile
+from .driver import DISCARD
+from .events import EventInstance
+from .timers import Timers
 
 
 class CoSimulationInstance(EventInstance):
     """One instance of an FMU in a run, with Co-Simulation."""
 
-    def __init__(self, name: str, fmu: FMU, failures: Failures, used: set[str], h: float) -> None:
-        super().__init__(name, fmu, failures, used)
-        self._timers = Timers(self.fmi, fmu.clocks.values(), h)
-        self.event_mode = fmu.event_mode
-        self.step_callback: Any = None
-        if self.fmi.answer is not None:
-            self.event_time = self.fmi.answer.event_time
+    def __init__(
+        self,
+        name: str,
+        fmu: FMUFile,
+        failures: Failures,
+        used: set[str],
+        h: float,
+        event_mode: bool,
+        isolated: bool,
+    ) -> None:
+        super().__init__(name, fmu, failures, used, event_mode, isolated)
+        self._timers = Timers(self.driver, fmu.clocks.values(), h)
+        self.event_mode = event_mode
+        self.step_callbacks: list[Any] = []
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and, in event mode, the events of the start."""
@@ -55,52 +57,19 @@ class CoSimulationInstance(EventInstance):
 
     def advance(self) -> list[Op]:
         """Do the step."""
-        function = self._function(f"{self.fmi.PREFIX}DoStep")
-        op = Op(f"{self.name}: step (FMU)", self.fmi.DO_STEP, function, self._component)
-        answer = self.fmi.answer
+        version, answer = self.fmu.version, self.driver.answer
+        function = self._function(f"{version.prefix}DoStep")
+        op = Op(f"{self.name}: step (FMU)", version.do_step, function, self._component)
         if answer is None:
-            self.step_callback = self.failures.guard(self.name, self._discarded)
+            callback = self._callback(self.step_callbacks, self._discarded)
         else:
             op = replace(op, b=int(answer.flags.ctypes.data), c=int(answer.times.ctypes.data))
-            self.step_callback = self.failures.guard(self.name, lambda t, h: self._finish_step(answer, t, h))
-        callback = ctypes.cast(self.step_callback, ctypes.c_void_p).value or 0
+            callback = self._callback(self.step_callbacks, lambda t, h: self.driver.finish_step(t, h, self))
         return [replace(op, d=callback, participant=self.name)]
 
-    def _resume(self) -> None:
-        self.fmi.attempt("enter step mode", self.api.enterStepMode)
-
     def _discarded(self, t: float, h: float) -> None:
-        """Find out why a step of FMI 2.0 was discarded: to end the run, or because it failed."""
-        last = self.fmi.asks_to_end()
+        """Find out why FMI 2.0 discarded a step: to end the run, or because it failed."""
+        last = self.driver.asks_to_end()
         if last is None:
-            raise SimulationError(self.fmi.logged(self.fmi.failure(_DISCARD, t)))
-        self.failures.ask_to_end(self.name, last, last >= t + h - SLACK * h)
-
-    def _finish_step(self, answer: StepAnswer, t: float, h: float) -> None:
-        """Go on with the step over [t, t + h] from where it was interrupted, until its end."""
-        end, near = t + h, SLACK * h
-        now, stuck = answer.came_to(end), 0
-        while True:
-            if answer.terminate:
-                self.failures.ask_to_end(self.name, now, now >= end - near)
-            if self.event_mode and (answer.event or self.event_time[0] <= now):
-                self._event(now, now >= end - near)
-            if now >= end - near:
-                answer.flags[:] = 0
-                return
-            if self.failures.interrupted:
-                raise KeyboardInterrupt
-            event = float(self.event_time[0])
-            # a time event at the end, to rounding, is met at its own instant
-            before, until = now, event if now < event <= end + near else end
-            self._do_step(answer, before, until - before)
-            now = answer.came_to(until)
-            stuck = 0 if now > before else stuck + 1
-            if stuck > (EVENT_ITERATIONS if self.event_mode and answer.event else 0):
-                raise FMUError(
-                    f"{self.name} returns early from its step at t = {before:g} s without getting on (the "
-                    f"communication step is from {t:g} s to {end:g} s); look at its inputs and at its log"
-                )
-
-    def _do_step(self, answer: StepAnswer, t: float, h: float) -> None:
-        answer.take(*self.fmi.attempt("do its step", lambda: self.api.doStep(t, h, False)))
+            raise SimulationError(self.driver.logged(self.driver.failure(DISCARD, t)))
+        self.end_run(last, last >= t + h - SLACK * h)

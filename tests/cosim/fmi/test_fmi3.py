@@ -205,11 +205,13 @@ def test_numbers_that_a_type_does_not_hold(probes, version):
             simulate(
                 System({"r": Ramp(), "p": FMU(probes[version])}, [("r.u", f"p.{target}")]), step=H, stop=1.125
             )
-    with pytest.raises(FMUError, match=r"start value i_in = 2147483648 is no Int.* \(a whole number from"):
+    with pytest.raises(
+        FMUError, match=r"start value i_in = 2147483648 does not fit type Int.* \(a whole number from"
+    ):
         FMU(probes[version], start={"i_in": 2**31})
-    with pytest.raises(FMUError, match="start value b_in = 2 is no Boolean"):
+    with pytest.raises(FMUError, match="start value b_in = 2 does not fit type Boolean"):
         FMU(probes[version], start={"b_in": 2})
-    with pytest.raises(FMUError, match="start value label = 3 is no String"):
+    with pytest.raises(FMUError, match="start value label = 3 does not fit type String"):
         FMU(probes[version], start={"label": 3})
 
 
@@ -294,16 +296,16 @@ def test_structural_parameters_size_arrays(probes):
     last = 2.0 + 3.0 * H
     assert result["p.v_out"].tolist() == [[8.0, 6.0, 4.0, 2.0]] * 2 + [[8.0, 6.0, 2 * last, 2.0]]
     assert result["p.v_in[2]"].tolist() == [2.0, 2.0, last]
-    with pytest.raises(FMUError, match=r"v_in = .* is no Float64 of shape \(4,\)"):
+    with pytest.raises(FMUError, match=r"v_in = .* does not fit type Float64 of shape \(4,\)"):
         FMU(probes["3.0"], start={"n": 4, "v_in": [1.0, 2.0, 3.0]})
-    with pytest.raises(FMUError, match=r"start value n = 1\.5 is no UInt64"):
+    with pytest.raises(FMUError, match=r"start value n = 1\.5 does not fit type UInt64"):
         FMU(probes["3.0"], start={"n": 1.5})
 
 
 def test_binary_start_values(probes):
     fmu = FMU(probes["3.0"], start={"blob": bytes([1, 2, 250])})
     assert simulate(System({"p": fmu}), step=H, stop=H)["p.blob_sum"][-1] == 253.0
-    with pytest.raises(FMUError, match="start value blob = 'text' is no Binary"):
+    with pytest.raises(FMUError, match="start value blob = 'text' does not fit type Binary"):
         FMU(probes["3.0"], start={"blob": "text"})
 
 
@@ -363,7 +365,7 @@ def test_blocks_as_fmus_in_a_cycle_and_at_solver_stages(tmp_path):
         system.connect("b.y", "a.x")
     with pytest.raises(WiringError, match=r"a \(twice\.fmu\) stands for a block at every stage .* every=1"):
         simulate(system, step=0.1, stop=1.0, coupling="continuous")
-    with pytest.raises(FMUError, match="every and sample_period are those of a block; say as_block=True"):
+    with pytest.raises(FMUError, match="every and sample_period belong to a block; give as_block=True"):
         FMU(path, every=2)
     plant = export(Chain(), tmp_path / "me.fmu", interfaces=["ModelExchange"])
     with pytest.raises(FMUError, match="as_block=True needs Co-Simulation"):

@@ -8,6 +8,7 @@ import re
 import stat
 import struct
 import threading
+import tracemalloc
 import warnings
 import zipfile
 from pathlib import Path
@@ -68,10 +69,10 @@ def tmp(tmp_path, monkeypatch):
     [
         ("../evil", "leads out of the folder"),
         ("resources/../../evil", "leads out of the folder"),
-        ("/etc/evil", "is no path inside the FMU"),
-        ("C:/evil", "is no path inside the FMU"),
-        ("C:evil", "is no path inside the FMU"),
-        ("resources\\..\\..\\evil", "is no path inside the FMU"),
+        ("/etc/evil", "is not a path inside the FMU"),
+        ("C:/evil", "is not a path inside the FMU"),
+        ("C:evil", "is not a path inside the FMU"),
+        ("resources\\..\\..\\evil", "is not a path inside the FMU"),
         ("x/" * 2000 + "y", "is a path of 4,001 characters, more than 1,024"),
         (special("resources/link", stat.S_IFLNK | 0o777), "is a link or a device"),
         (special("resources/pipe", stat.S_IFIFO | 0o666), "is a link or a device"),
@@ -93,7 +94,7 @@ def test_a_path_that_zipfile_does_not_write(tmp_path, tmp, name):
         at = content.rfind(b"PK\x01\x02")
         content = content[: at + 28] + struct.pack("<HH", 0, 3) + content[at + 32 :]
     (tmp_path / "name.fmu").write_bytes(content)
-    refused(tmp_path / "name.fmu", "is no path inside the FMU")
+    refused(tmp_path / "name.fmu", "is not a path inside the FMU")
 
 
 def test_a_file_that_is_a_folder_too(tmp_path, tmp):
@@ -170,6 +171,18 @@ def test_a_bomb_that_declares_little(tmp_path, tmp):
     refused(path, "'zeros' cannot be unpacked: Bad CRC-32")
 
 
+def test_a_model_description_that_declares_little(tmp_path, tmp):
+    """256 MB of blanks in 260 KB, declared as 100 bytes, are not inflated to find that out."""
+    path = write(tmp_path / "bomb.fmu", text=b" " * (256 << 20), compression=zipfile.ZIP_DEFLATED)
+    declare(path, "modelDescription.xml", 100)
+    tracemalloc.start()
+    try:
+        refused(path, "'modelDescription.xml' cannot be unpacked: Bad CRC-32")
+        assert tracemalloc.get_traced_memory()[1] < 10 << 20  # the archive itself, and the imports of FMPy
+    finally:
+        tracemalloc.stop()
+
+
 def test_a_bomb_of_overlapping_files(tmp_path, tmp):
     """Thousands of entries that all are one and the same 1 MB: 7 GB from 600 kB."""
     path = write(tmp_path / "overlap.fmu", more=[("zeros", bytes(2**20))], compression=zipfile.ZIP_DEFLATED)
@@ -188,7 +201,7 @@ def test_an_archive_of_too_many_entries(tmp_path, tmp, monkeypatch):
     """By count, and by the size of the directory before it is read."""
     path = write(tmp_path / "many.fmu", more=[(f"r/{i}", b"") for i in range(50)])
     monkeypatch.setattr(archive, "MAX_ENTRIES", 50)
-    refused(path, "has 52 entries, which no FMU has")
+    refused(path, "has 52 entries, too many for an FMU")
     monkeypatch.setattr(archive, "MAX_DIRECTORY", 1000)
     refused(path, "has a directory of .* too many entries for an FMU")
     large = zipfile.ZipFile(tmp_path / "large.fmu", "w")
@@ -363,7 +376,7 @@ def test_binaries_for_another_platform(tmp_path, version):
     with zipfile.ZipFile(path, "w") as written:
         written.writestr("modelDescription.xml", (description2 if version == "2.0" else description3)(False))
         written.writestr("binaries/win64/probe.dll", b"MZ")
-    refused(path, r"has no binary for \S+ \(it has: win64\)")
+    refused(path, r"has no binary for \S+ \(available: win64\)")
 
 
 # ---------------------------------------------------------------------- shared extraction
