@@ -20,7 +20,7 @@ from ..units import BASE_UNITS, Definition
 
 Shape: TypeAlias = tuple[int, ...]
 
-#: values of one port: 80 MB of floats, exchanged at every step
+#: values of all ports of an FMU: 80 MB of floats, exchanged at every step
 MAX_ELEMENTS = 10_000_000
 
 
@@ -134,6 +134,11 @@ def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[st
             groups.setdefault((match[1], len(index)), []).append((index, v))
         else:
             found[v.name] = single(v, shape)
+    if (total := sum(port.size for port in found.values())) > MAX_ELEMENTS:
+        raise FMUError(
+            f"the arrays of {', '.join(list(found)[:3])[:80]} ... have {total:,} values together, more than "
+            f"{MAX_ELEMENTS:,}; check their dimensions, or the structural parameters that give them"
+        )
     ranks = Counter(base for base, _ in groups)
     for (base, rank), members in groups.items():
         members.sort(key=lambda member: member[0])

@@ -50,7 +50,7 @@ class Driver2(Driver):
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
         values = self.attempt("get its values", lambda: getattr(self.api, f"get{access}")(references))
-        return [v.decode(errors="replace") for v in values] if access == "String" else list(values)
+        return [(v or b"").decode(errors="replace") for v in values] if access == "String" else list(values)
 
     def asks_to_end(self) -> float | None:
         """Ask an FMU that discarded a step whether it did so to end the run."""

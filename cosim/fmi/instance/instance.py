@@ -16,7 +16,6 @@ import numpy as np
 from ...errors import CosimError, FMUError, SnapshotError
 from ...loop.operations import CALL, FROM_FLOAT, TO_FLOAT, Number, Op
 from ...loop.signals import Failures, ctrl_c
-from ...run.kernel_instance import buffer
 from ..fmu_file import FMUFile
 from ..ports import FMUPort
 from .driver import ERROR, OK
@@ -38,7 +37,7 @@ class VariableGroup:
         self.number = number
         self.references = np.array([v.valueReference for p in ports for v in p.variables], dtype=np.uint32)
         self.elements = [e for p in ports for e in p.elements()]
-        self.values = buffer(len(self.elements))
+        self.values = np.zeros(len(self.elements))
         #: the memory that the FMU reads and writes: the floats themselves if its type is Float64
         self.raw = self.values if number.dtype == "float64" else np.zeros(len(self.elements), number.dtype)
         #: last values sent to the FMU, of discrete inputs; of output clocks, whether they have ticked

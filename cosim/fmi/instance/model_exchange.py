@@ -17,15 +17,20 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core.tableaus import TABLEAUS
+from ...core.variables import Array
 from ...errors import CosimError
 from ...loop.operations import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
 from ...loop.signals import Failures
-from ...run.kernel_instance import buffer
 from ..fmu_file import FMUFile
 from ..interfaces import DEFAULT_TOLERANCE, ModelExchange
 from .continuous_time import ContinuousTime
 from .event_steps import EventSteps, RungeKutta
 from .events import EventInstance
+
+
+def _floats(n: int) -> Array:
+    """Return memory for n floats; never empty, so that it has an address."""
+    return np.zeros(max(n, 1))
 
 
 class LateEventWarning(UserWarning):
@@ -52,11 +57,11 @@ class ModelExchangeInstance(EventInstance):
         except CosimError:
             self.stop()
             raise
-        self.states = buffer(self.n_states)
+        self.states = _floats(self.n_states)
         self.state_address = int(self.states.ctypes.data)
         self.flags = np.zeros(2, dtype=fmu.version.flag)
-        self.signs = buffer(self.n_indicators) > 0.0
-        self.stages = buffer(5 * self.n_states)
+        self.signs = _floats(self.n_indicators) > 0.0
+        self.stages = _floats(5 * self.n_states)
         self.event_address = 0
         self.callbacks: list[Any] = []
         self.model = ContinuousTime(self.driver, self.n_states, self.n_indicators)
@@ -183,7 +188,7 @@ class ModelExchangeInstance(EventInstance):
     # -------------------------------------------------------------------------- events
 
     def _indicator_signs(self) -> Any:
-        z = buffer(self.n_indicators)
+        z = _floats(self.n_indicators)
         self.model.get_indicators(z.ctypes.data)
         return z > 0.0
 

@@ -149,7 +149,7 @@ def test_clocks_that_are_refused(path, tmp_path):
         FMU(metronome(tmp_path / "none.fmu", clocks=True, clock=xml))
     with pytest.raises(FMUError, match=r"clock kick takes no interval \(it is triggered\)"):
         FMU(path, start={"kick": 0.5})
-    with pytest.raises(FMUError, match="start value tick = 'fast' is no number with a unit"):
+    with pytest.raises(FMUError, match="start value tick = 'fast' must be a number with a unit"):
         FMU(path, start={"tick": "fast"})
     with pytest.raises(FMUError, match=r"own has an interval neither .* give one: start=\{'own': 0\.01\}"):
         simulate(System({"m": FMU(path, start={"own_period": -1.0})}), step=H, stop=5.0)

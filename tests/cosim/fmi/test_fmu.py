@@ -93,7 +93,7 @@ def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
     ("start", "words"),
     [
         ({"kk": 1.0}, "no variable 'kk'; did you mean 'k'"),
-        ({"k": "stiff"}, "start value k = 'stiff' is no number with a unit"),
+        ({"k": "stiff"}, "start value k = 'stiff' must be a number with a unit"),
         ({"k": np.nan}, "does not fit type Real"),
         ({1: 2.0}, "has no variable '1'"),
         ([1.0, 2.0], r"start=\[1.0, 2.0\] has no names"),

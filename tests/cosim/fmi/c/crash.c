@@ -2,7 +2,7 @@
 
    The GUID of its model description says how: "FUNCTION WAY TIME", such as "DoStep null 0.5", makes
    fmi2DoStep write to address 0 when the time it was told is 0.5 or later. Before that it logs a line.
-   "none choosy 0" refuses the value 3. "FUNCTION fatal TIME" answers fmi2Fatal, and crashes when it is called once more to be freed.
+   "none choosy 0" refuses the value 3, and "none negative 0" answers a set with the status -1. "FUNCTION fatal TIME" answers fmi2Fatal, and crashes when it is called once more to be freed.
    With CRASH_AT_LOAD in the environment, the library aborts when it is loaded. */
 
 #include <stdio.h>
@@ -84,6 +84,7 @@ EXPORT fmi2Status fmi2GetReal(P, const unsigned vr[], size_t n, double value[]) 
 EXPORT fmi2Status fmi2SetReal(P, const unsigned vr[], size_t n, const double value[]) {
     FAIL(SetReal);
     if (strcmp(p->way, "refuse") == 0 && p->time >= p->at) return fmi2Error;
+    if (strcmp(p->way, "negative") == 0) return -1;
     if (strcmp(p->way, "choosy") == 0 && value[0] == 3) return fmi2Error;
     for (size_t i = 0; i < n; i++) *(vr[i] == 0 ? &p->u : &p->x) = value[i];
     return fmi2OK;

@@ -252,7 +252,7 @@ def test_entities(tmp_path, tmp, doctype, use, encoding):
     text = description2(False).replace('modelName="probe"', f'modelName="{use}"')
     text = text.replace("<fmiModel", doctype + "<fmiModel", 1).replace("UTF-8", encoding)
     path = write(tmp_path / "entities.fmu", text=text.encode(encoding))
-    refused(path, "has a DOCTYPE, which FMI does not have|modelDescription.xml is broken: .*entit")
+    refused(path, "has a DOCTYPE, which FMI does not use|modelDescription.xml is broken: .*entit")
 
 
 @pytest.mark.parametrize(
@@ -263,18 +263,18 @@ def test_entities(tmp_path, tmp, doctype, use, encoding):
         (lambda t: t.replace("UTF-8", "EBCDIC-99"), "is broken: .*encoding"),
         (lambda t: t[: len(t) // 2], "is broken"),
         (lambda t: "", "is broken"),
-        (lambda t: "<html/>", "describes no FMU but 'html'"),
+        (lambda t: "<html/>", "must describe an FMU, and its root is 'html'"),
         (lambda t: t.replace('"2.0"', '"1.0"', 2), "FMI version 1.0; FMI 2.0 and 3.0 are supported"),
         (lambda t: t.replace(' valueReference="3"', ""), "'valueReference' is required but missing"),
         (lambda t: t.replace('Reference="3"', 'Reference="1"').replace("<Integer start", "<Real start"),
          "inputs r_in and i_in have the same value reference 1"),
         (lambda t: t.replace('name="i_in"', 'name="r_in"'), "name \"r_in\" .* is not unique"),
-        (lambda t: t.replace('index="2"', 'index="0"'), "by its number, and there are 1 to"),
-        (lambda t: t.replace('index="2"', 'index="99"'), "makes no sense to FMPy .IndexError"),
+        (lambda t: t.replace('index="2"', 'index="0"'), "by its number, which must be from 1 to"),
+        (lambda t: t.replace('index="2"', 'index="99"'), "FMPy cannot interpret it .IndexError"),
         (lambda t: t.replace('dependencies="1"', 'dependencies="0"'), "refers to a variable by its number"),
-        (lambda t: t.replace('fier="probe"', 'fier="../../probe"'), "is a path, and must be a file's"),
+        (lambda t: t.replace('fier="probe"', 'fier="../../probe"'), "is a path; it must be the name"),
         (lambda t: t.replace('fier="probe"', 'fier="prob"'), r"has no library binaries/.*/prob\."),
-        (lambda t: t.replace('"0.5" unit="N"', '"0.5" displayUnit="kN"'), "makes no sense to FMPy .KeyError"),
+        (lambda t: t.replace('"0.5" unit="N"', '"0.5" displayUnit="kN"'), "cannot interpret it .KeyError"),
         (lambda t: t.replace('"0.5" unit="N"', '"0.5" unit="kN"'), "unit \"kN\" .* is not defined"),
     ],
 )  # fmt: skip
@@ -346,7 +346,7 @@ def test_a_binary_that_is_no_library(tmp_path, version):
     wrong = {
         b"": "cannot be loaded",
         b"#!/bin/sh\necho no library\n": "cannot be loaded",
-        **{whole[:n]: "cannot be loaded|is cut off at" for n in (4, 63, 64, 200, 700, 4096)},
+        **{whole[:n]: "cannot be loaded|is truncated at" for n in (4, 63, 64, 200, 700, 4096)},
     }
     for content, words in wrong.items():
         path = changed(
