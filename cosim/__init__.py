@@ -10,6 +10,7 @@ from .errors import (
     CosimError,
     DeclarationError,
     FMUError,
+    OptionError,
     RecordError,
     SimulationEndedWarning,
     SnapshotError,
@@ -20,8 +21,7 @@ from .fmi.fmu import FMU
 from .fmi.interfaces import CoSimulation, ModelExchange
 from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
 from .result import Interrupted, Result, SimulationError, Statistics
-from .run.master import schedule, simulate
-from .run.simulation import Simulation, Snapshot
+from .run.simulation import Simulation, Snapshot, schedule, simulate
 from .ssp.reader import read_ssp
 from .system.system import System
 
@@ -43,6 +43,7 @@ __all__ = [
     "LinearContinuous",
     "Local",
     "ModelExchange",
+    "OptionError",
     "Output",
     "Parameter",
     "Participant",

@@ -38,6 +38,10 @@ class TimeError(CosimError):
     """A step, stop time or sample period that does not fit the communication grid."""
 
 
+class OptionError(CosimError):
+    """An option of a run that does not exist or does not fit."""
+
+
 class SnapshotError(CosimError):
     """A state that cannot be saved or returned to."""
 

@@ -16,7 +16,7 @@ from ..fmi.file.display_units import has_unit
 from ..fmi.fmu import FMU
 from ..fmi.interfaces import InterfaceName, Solver, interface_of
 from ..result import Result
-from ..run.master import simulate
+from ..run.simulation import simulate
 from ..system.system import System
 from .input_table import connect_inputs, start_from_inputs
 from .scenario import Scenario

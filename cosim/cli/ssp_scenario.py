@@ -8,8 +8,8 @@ from typing import Any, get_args
 
 from ..errors import did_you_mean
 from ..result import Result
-from ..run.master import simulate
 from ..run.plan import Coupling, Solver
+from ..run.simulation import simulate
 from ..ssp.reader import Package, read_package
 from ..system.system import System
 from .scenario import Scenario, ScenarioError, find_part

@@ -1,7 +1,7 @@
 """The C compiler: `python -m ziglang cc`, which links for every platform from any machine.
 
-Its CPU level is the lowest of each platform, the C library the oldest that is worth it, so
-that what was linked here runs there. FMI's headers come with FMPy.
+It compiles for the lowest CPU level of each platform and an old C library, so that a
+library that was linked here runs on any such machine. FMI's headers come with FMPy.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .kernels import cache_directory, write_atomically
 
 @dataclass(frozen=True)
 class Platform:
-    """Where a library runs: its name here and in FMI 3.0, the linker's target, FMI 2.0's folder."""
+    """A platform: its name here and in FMI 3.0, the linker's target, the folder of FMI 2.0, the suffix."""
 
     name: str
     target: str
@@ -31,7 +31,7 @@ class Platform:
     suffix: str
 
 
-#: FMI 2.0 has one folder per system: see `folders` in fmus/export.py for two architectures at once.
+#: FMI 2.0 has one folder per system: see `folders` in fmus/export for two architectures at once.
 PLATFORMS = {
     p.name: p
     for p in (
@@ -43,7 +43,7 @@ PLATFORMS = {
     )
 }
 
-#: for a shared library whose code and data are its own
+#: for a shared library that shares no code or data with others
 LIBRARY_FLAGS = (
     *("-std=c23", "-O2", "-Wall", "-Wextra", "-g0", "-s"),
     *("-shared", "-fPIC", "-fvisibility=hidden", "-fomit-frame-pointer", "-fno-sanitize=all"),
@@ -51,13 +51,13 @@ LIBRARY_FLAGS = (
 
 
 def host() -> str:
-    """Return the name of the platform that this runs on."""
+    """Return the name of this machine's platform."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(m := host_platform.machine().lower(), m)
     return f"{machine}-{host_platform.system().lower()}"
 
 
 def cached_library(parts: Iterable[str], suffix: str, build: Callable[[], bytes]) -> Path:
-    """Return the file of a shared library that depends on `parts` and the compiler; build it if it is new."""
+    """Return the file of a shared library that depends on `parts` and the compiler; build a new one."""
     if importlib.util.find_spec("ziglang") is None:
         raise CompilationError("no C compiler: the package ziglang is not installed; pip install ziglang")
     key = hashlib.sha256("\0".join([*parts, importlib.metadata.version("ziglang")]).encode()).hexdigest()
@@ -78,9 +78,9 @@ def zig_cc(arguments: Sequence[str | Path], folder: Path) -> subprocess.Complete
 
 
 def complaint(stderr: str) -> str:
-    """Return what the compiler said, as one line."""
+    """Return the errors of the compiler as one line."""
     lines = [line.strip() for line in stderr.splitlines() if "error" in line or "undefined symbol" in line]
-    return "; ".join(lines[:4]) or stderr.strip()[-400:] or "the compiler said nothing"
+    return "; ".join(lines[:4]) or stderr.strip()[-400:] or "the compiler gave no reason"
 
 
 def fmi_headers() -> Path:

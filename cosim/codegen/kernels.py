@@ -1,10 +1,10 @@
 """From kernels to machine code: Numba -> LLVM IR -> stripped -> address, cached on disk.
 
-The stripped IR is what the loop loads and what the exporter links into an FMU: one
-text, so both compute the same. It depends on libm only. Numba is imported when a
-kernel is compiled for the first time; afterwards its IR comes from the cache, which is
-keyed by everything that the code depends on (source code of the kernels and of every
-function they call, layout of the record, versions).
+The loop loads the stripped IR, and the exporter links it into an FMU: one text, so both
+compute the same. It depends on libm only. Numba is imported when a kernel is compiled for
+the first time; afterwards its IR comes from the cache, which is keyed by everything that
+the code depends on: source code of the kernels and of every function that they call,
+layout of the storage, versions of the tools.
 """
 
 from __future__ import annotations
@@ -20,19 +20,17 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import llvmlite.binding as llvm
 from platformdirs import user_cache_path
 
+from ..core.participant import Participant
 from ..errors import CompilationError, CosimError
-
-if TYPE_CHECKING:
-    from ..core.participant import Participant
 
 _LIBRARIES = {"numpy", "math", "numba", "scipy", "llvmlite", "builtins"}
 
-#: what the IR of a kernel may leave to the C library of the platform
+#: the functions of the platform's C library that the IR of a kernel may call
 LIBM = frozenset(
     "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp exp2 expm1 log log2 log10 "
     "log1p pow sqrt cbrt hypot fabs floor ceil trunc round rint nearbyint fmod fmin fmax copysign ldexp "
@@ -45,12 +43,6 @@ _REMEDY = {
 }
 
 
-def remedy(symbol: str) -> str:
-    """Return why compiled code cannot have a symbol, and what to do about it."""
-    known = (text for prefix, text in _REMEDY.items() if symbol.startswith(prefix))
-    return next(known, "it is not in libm; call only functions of libm and of cosim.functions")
-
-
 def cache_directory() -> Path:
     """Return the folder for compiled code; the environment variable STRUCTCOSIM_CACHE moves it."""
     chosen = os.environ.get("STRUCTCOSIM_CACHE")
@@ -59,14 +51,14 @@ def cache_directory() -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CosimError(
-            f"compiled code cannot be kept in {path}: {error.strerror}; "
-            "name a folder that can be written in the environment variable STRUCTCOSIM_CACHE"
+            f"compiled code cannot be stored in {path}: {error.strerror}; "
+            "name a writable folder in the environment variable STRUCTCOSIM_CACHE"
         ) from error
     return path
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that another process sees all of it or nothing."""
+    """Write a file so that another process sees either all of it or none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent)
     try:
@@ -82,7 +74,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def _is_ours(value: Any) -> bool:
-    """Tell whether a global of a kernel is a Python function that has to be compiled with it."""
+    """Tell whether a global of a kernel is a Python function that must be compiled with it."""
     return isinstance(value, types.FunctionType) and not _is_library(value.__module__ or "")
 
 
@@ -97,7 +89,7 @@ def _names(code: types.CodeType) -> set[str]:
 
 
 def _describe(value: Any, seen: dict[int, int]) -> str:
-    """Return a text that changes when what a kernel computes with `value` can change."""
+    """Return a text that differs whenever a kernel could compute something else with `value`."""
     if isinstance(value, (tuple, list)):
         return f"{type(value).__name__}({[_describe(item, seen) for item in value]})"
     if isinstance(value, types.CodeType):
@@ -131,23 +123,18 @@ def _describe(value: Any, seen: dict[int, int]) -> str:
 
 
 @lru_cache(maxsize=1)
-def _own_source() -> str:
-    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+def _tools() -> tuple[str, ...]:
+    """Return the versions of all that makes the code: this file, Python, the libraries, the processor."""
+    versions = (version(name) for name in ("numba", "llvmlite", "numpy"))
+    own = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    return own, sys.version, *versions, llvm.get_host_cpu_name()
 
 
 def fingerprint(functions: Mapping[str, Callable[..., Any]], *more: object) -> str:
     """Return a hash of functions, of all functions and constants they use, and of the tool versions."""
     seen: dict[int, int] = {}
     parts = [f"{name}:{_describe(function, seen)}" for name, function in functions.items()]
-    parts += [repr(item) for item in more]
-    parts += [
-        _own_source(),
-        sys.version,
-        version("numba"),
-        version("llvmlite"),
-        version("numpy"),
-        llvm.get_host_cpu_name(),
-    ]
+    parts += [*(repr(item) for item in more), *_tools()]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
@@ -157,7 +144,7 @@ def fingerprint(functions: Mapping[str, Callable[..., Any]], *more: object) -> s
 def _jitted(
     function: Callable[..., Any], kernels: Mapping[str, Callable[..., Any]], memo: dict[Any, Any]
 ) -> Any:
-    """Return `function` for Numba, with the Python functions it calls made compilable too."""
+    """Return `function` for Numba, with the Python functions that it calls made compilable too."""
     import numba
 
     if function in memo:
@@ -177,9 +164,9 @@ def _jitted(
 
 
 def _without_python(dispatcher: Any) -> Any:
-    """Spare what only Python needs: the wrappers, and machine code for every single function.
+    """Leave out the parts that only Python needs: wrappers, and machine code for every single function.
 
-    These are Numba's internals; tests/cosim/test_compiler.py notices when they move.
+    These are Numba's internals; tests/cosim/codegen/test_kernels.py notices when they change.
     """
 
     def flags_without_wrappers(flags: Any) -> Any:
@@ -187,7 +174,7 @@ def _without_python(dispatcher: Any) -> Any:
         return flags
 
     def keep(compiled: Any) -> None:
-        compiled = compiled._replace(entry_point=object())  # what callers look the code up by
+        compiled = compiled._replace(entry_point=object())  # by which callers look up the code
         dispatcher.targetctx.insert_user_function(compiled.entry_point, compiled.fndesc, [compiled.library])
         dispatcher.overloads[tuple(compiled.signature.args)] = compiled
 
@@ -197,9 +184,9 @@ def _without_python(dispatcher: Any) -> Any:
 
 
 def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...]) -> str:
-    """Compile a kernel of (record, then up to two times); return IR of `i32 name(ptr, double, double)`.
+    """Compile a kernel of (storage, then up to two times); return IR of `i32 name(ptr, double, double)`.
 
-    It gives 0, or Numba's code of the exception that was raised.
+    The function returns 0, or Numba's code of the exception that was raised.
     """
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.errors import NumbaError
@@ -210,8 +197,8 @@ def _lower(name: str, dispatcher: Any, signature: tuple[Any, ...]) -> str:
         raise CompilationError(f"{name} cannot be compiled: {_first_reason(str(error))}") from error
     except (AssertionError, NotImplementedError) as error:
         raise CompilationError(
-            f"{name} cannot be compiled: Numba does not support an operation in it. Assigning a whole "
-            "array to a declared variable is such a one; use assign(x, self.y) or a loop"
+            f"{name} cannot be compiled: Numba does not support an operation in it, such as assigning a "
+            "whole array to a declared variable; use assign(x, self.y) or a loop"
         ) from error
     compiled = dispatcher.overloads[signature]
     returned = str(compiled.signature.return_type)
@@ -252,7 +239,7 @@ def _first_reason(text: str) -> str:
 
 
 def _stripped(module: Any, name: str) -> str:
-    """Keep `name` and what it needs; everything else, Numba's Python wrappers first, goes."""
+    """Keep `name` and the functions that it needs; remove all others, such as wrappers for Python."""
     for item in [*module.functions, *module.global_variables]:
         if not item.is_declaration and item.name != name:
             item.linkage = "internal"
@@ -262,12 +249,18 @@ def _stripped(module: Any, name: str) -> str:
     options.slp_vectorization = True
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
+    check_symbols(module, name)
+    return "\n".join(line for line in str(module).splitlines() if not line.startswith("target ")) + "\n"
+
+
+def check_symbols(module: Any, name: str) -> None:
+    """Refuse a kernel that needs a symbol which neither the loop nor an FMU has: they have libm only."""
     for function in module.functions:
         symbol = function.name
         if function.is_declaration and not symbol.startswith("llvm.") and symbol not in LIBM:
-            why = remedy(symbol)
-            raise CompilationError(f"{name} needs '{symbol}', which is not there without Python: {why}")
-    return "\n".join(line for line in str(module).splitlines() if not line.startswith("target ")) + "\n"
+            known = (text for prefix, text in _REMEDY.items() if symbol.startswith(prefix))
+            why = next(known, "it is not in libm; call only functions of libm and of cosim.functions")
+            raise CompilationError(f"{name} needs '{symbol}', which compiled code does not have: {why}")
 
 
 @lru_cache(maxsize=1)
@@ -294,11 +287,10 @@ def kernel_key(participant: Participant) -> str:
 
 
 def lower(participant: Participant) -> str:
-    """Return LLVM IR with `i32 kernel_NAME(double *record, double t, double h)` for every kernel NAME.
+    """Return LLVM IR with `i32 kernel_NAME(double *storage, double t, double h)` for every kernel NAME.
 
     The text names no target and needs no symbol but libm's. Raises CompilationError,
-    naming class and kernel, when Numba cannot compile a kernel or when what it makes
-    needs Python.
+    naming class and kernel, when Numba cannot compile a kernel or when the code needs Python.
     """
     return _cached(kernel_key(participant), lambda: _lower_kernels(participant))
 
@@ -306,12 +298,12 @@ def lower(participant: Participant) -> str:
 def _lower_kernels(participant: Participant) -> str:
     import numba
 
-    record = numba.from_dtype(participant.dtype)
+    storage = numba.from_dtype(participant.dtype)
     memo: dict[Any, Any] = {}
     linked = None
     for name, kernel in participant.kernels.items():
         times = kernel.__code__.co_argcount - 1
-        signature = (record, *([numba.float64] * times))
+        signature = (storage, *([numba.float64] * times))
         dispatcher = _jitted(kernel, participant.kernels, memo)
         try:
             text = _lower(f"kernel_{name}", dispatcher, signature)
@@ -328,7 +320,7 @@ def _lower_kernels(participant: Participant) -> str:
 # ----------------------------------------------------------------------- loading
 
 _engines: dict[str, Any] = {}
-_engines_lock = threading.Lock()  # an engine that a second thread replaced would take its code with it
+_engines_lock = threading.Lock()  # an engine that a second thread replaced would be freed with its code
 
 
 def load(ir: str) -> Callable[[str], int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..errors import TimeError
 
 
@@ -10,12 +12,35 @@ def steps_between(period: float, h: float, what: str) -> int:
     ratio = period / h
     if not ratio < 2**53:
         raise TimeError(f"{what} of {period:g} s is {ratio:g} steps of {h:g} s, more than can be counted")
-    steps = round(ratio)
-    # room for the round-off of decimal numbers, and never for more than a millionth of a step
-    if steps < 1 or abs(ratio - steps) > min(1e-9 * steps, 1e-6):
-        near = period / max(round(ratio + 0.5), 1)
+    steps = _whole(ratio)
+    if steps is None:
         raise TimeError(
-            f"{what} of {period:g} s is {ratio:.6g} communication steps of {h:g} s; "
-            f"it must be a whole number of them: choose a step such as {near:.6g} s"
+            f"{what} of {period:.10g} s is {_shown(ratio)} communication steps of {h:.10g} s; "
+            f"it must be a whole number of them: choose a step such as {_fitting(period, ratio)} s"
         )
     return steps
+
+
+def _whole(ratio: float) -> int | None:
+    """Return the whole number of steps that a ratio means, None if it means none."""
+    steps = round(ratio)
+    # room for the round-off of decimal numbers: never more than a millionth of a step, but for
+    # so many steps that the ratio itself is not held as precisely, and then a hundredth
+    room = max(min(1e-9 * steps, 1e-6), min(2.0 * math.ulp(ratio), 1e-2))
+    return steps if steps >= 1 and abs(ratio - steps) <= room else None
+
+
+def _shown(ratio: float) -> str:
+    """Return a ratio in few digits, but not so few that it looks whole."""
+    text = f"{ratio:.6g}"
+    return text if float(text) % 1.0 else f"{ratio:.14g}"
+
+
+def _fitting(period: float, ratio: float) -> str:
+    """Return a shorter step that `steps_between` accepts, in few digits or as a fraction."""
+    fewest = max(math.ceil(ratio), 1)
+    for steps in range(fewest, min(2 * fewest, fewest + 1000) + 1):
+        text = f"{period / steps:.6g}"
+        if _whole(period / float(text)) is not None:
+            return text
+    return f"{period!r}/{fewest}"

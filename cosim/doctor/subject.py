@@ -14,7 +14,7 @@ from ..fmi.instance.continuous_time import ContinuousTime
 from ..fmi.instance.drivers import load
 from ..fmi.instance.event_steps import EventSteps, RungeKutta
 from ..fmi.ports import FMUPort
-from ..loop.signals import Failures
+from ..loop.signals import RunSignals
 
 #: values of ports by name, as the FMU gives them
 Values: TypeAlias = dict[str, np.ndarray[Any, Any]]
@@ -50,7 +50,7 @@ class Subject:
         self.fmu = fmu
         self.plan = plan_of(fmu)
         self.model_exchange = model_exchange
-        self.driver = load(fmu, name, model_exchange, Failures(), fmu.event_mode and not model_exchange)
+        self.driver = load(fmu, name, model_exchange, RunSignals(), fmu.event_mode and not model_exchange)
         self.api = self.driver.api
         outputs = {n: fmu.output_ports[n] for n in fmu.declared_outputs} or fmu.output_ports
         self.outputs = dict(list(outputs.items())[:_MOST_PORTS])

@@ -15,7 +15,7 @@ from typing import Any
 
 from ..core.participant import Participant, rate
 from ..errors import FMUError, WiringError
-from ..loop.signals import Failures
+from ..run.instance import Setting
 from .fmu_file import FMUFile
 from .instance.co_simulation import CoSimulationInstance
 from .instance.model_exchange import ModelExchangeInstance
@@ -135,18 +135,17 @@ class FMU(FMUFile):
 
     # ----------------------------------------------------------------------- instances
 
-    def instance(
-        self, name: str, failures: Failures, used: set[str], h: float, stage: bool = False
-    ) -> CoSimulationInstance | ModelExchangeInstance:
-        """Return a running instance, which exchanges the used ports at steps of h (s).
+    def instance(self, name: str, setting: Setting) -> CoSimulationInstance | ModelExchangeInstance:
+        """Return a running instance (cosim/run/instance.py).
 
-        Raises WiringError where the FMU cannot serve stage coupling.
+        Raises WiringError if the FMU cannot serve stage coupling.
         """
-        if stage:
+        if setting.is_stage:
             self.check_stage(name)
-        if self.model_exchange or (stage and not self.as_block):
-            return ModelExchangeInstance(name, self, failures, used, self.integration, self.isolated)
-        return CoSimulationInstance(name, self, failures, used, h, self.event_mode, self.isolated)
+        used, signals = set(setting.used), setting.signals
+        if self.model_exchange or (setting.is_stage and not self.as_block):
+            return ModelExchangeInstance(name, self, signals, used, self.integration, self.isolated)
+        return CoSimulationInstance(name, self, signals, used, setting.step, self.event_mode, self.isolated)
 
     def check_stage(self, name: str) -> None:
         """Raise WiringError with the reason if the FMU cannot serve stage coupling."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core.port import Direction, Port
 from ..errors import FMUError, did_you_mean
-from ..loop.operations import Number
+from ..loop.numbers import Number
 from .clocks import clocks_of
 from .file.archive import Archive
 from .file.display_units import without_units

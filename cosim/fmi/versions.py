@@ -8,16 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..loop.operations import (
-    FMI2_COMPLETED,
-    FMI2_DO_STEP,
-    FMI2_VALUES,
-    FMI3_COMPLETED,
-    FMI3_DO_STEP,
-    FMI3_VALUES,
-    NUMBERS,
-    Number,
-)
+from ..loop.fmi_operations import FMI2Values, FMI3Values
+from ..loop.numbers import NUMBERS, Number
 
 
 @dataclass(frozen=True)
@@ -27,8 +19,8 @@ class Version:
     numbers
         of every numeric type the part of the function name (fmi2GetReal, fmi3GetFloat64), and its
         representation in memory
-    values, do_step, completed
-        operations of the loop
+    values
+        the operation of the loop that gets and sets values
     flag
         NumPy's name of the type of flags that functions return
     """
@@ -36,9 +28,7 @@ class Version:
     prefix: str
     numbers: Mapping[str, tuple[str, Number]]
     get_derivatives: str
-    values: int
-    do_step: int
-    completed: int
+    values: type[FMI2Values]
     flag: str
 
     @property
@@ -58,9 +48,7 @@ FMI2 = Version(
         "Boolean": ("Boolean", Number("i32", "int32", 0, 1)),
     },
     get_derivatives="fmi2GetDerivatives",
-    values=FMI2_VALUES,
-    do_step=FMI2_DO_STEP,
-    completed=FMI2_COMPLETED,
+    values=FMI2Values,
     flag="int32",
 )
 
@@ -73,9 +61,7 @@ FMI3 = Version(
         "Clock": ("Clock", NUMBERS["Float64"]),  # as a port; its start value is an interval
     },
     get_derivatives="fmi3GetContinuousStateDerivatives",
-    values=FMI3_VALUES,
-    do_step=FMI3_DO_STEP,
-    completed=FMI3_COMPLETED,
+    values=FMI3Values,
     flag="uint8",
 )
 

@@ -1,1 +1,1 @@
-"""What the loop runs: operations, how they are written as LLVM IR, and what ends a run."""
+"""The loop of a run: its operations, their text in LLVM IR, and the signals that end a run."""

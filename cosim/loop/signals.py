@@ -1,7 +1,7 @@
-"""What ends a run before its time: exceptions of callbacks, requests to end, Ctrl-C, operations that fail.
+"""Signals that end a run early: exceptions of callbacks, requests to end, Ctrl-C, operations that fail.
 
-A C loop carries no exception. A callback leaves it here and returns status 1; the master
-raises it, with what was computed until then, once the loop is back.
+The compiled loop cannot carry an exception. A callback leaves it here and returns status 1;
+the simulation raises it, with the result until then, once the loop has returned.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..result import SimulationError
-from .operations import CALL, COMBINE, FMI2_VALUES, FMI3_VALUES, FROM_FLOAT, TO_FLOAT, Op
+from .operations import Operation
 
-#: a kernel: its record, t and h in s; status 0 when all went well
+#: a kernel: the address of its storage, t and h in s; status 0 when all went well
 KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
 
 
@@ -30,8 +30,8 @@ class EndOfRun(Exception):
         self.text = text
 
 
-class Failures:
-    """Where callbacks leave an exception or a request to end for the master; a C loop cannot carry it."""
+class RunSignals:
+    """Exceptions and requests to end that callbacks leave for the simulation, and Ctrl-C."""
 
     def __init__(self) -> None:
         self.exception: BaseException | None = None
@@ -39,13 +39,14 @@ class Failures:
         self.time = 0.0
         #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
         self.interrupted = False
-        #: who asked to end the run, and when; "" while nobody does
+        #: the participant that asked to end the run, and when; "" while none does
         self.end = ""
         #: (1,) 1 when the loop is to end at the next point
         self.stop = np.zeros(1, dtype=np.int64)
+        self._callbacks: list[Any] = []
 
     def clear(self) -> None:
-        """Forget what happened: the simulation goes on from where it stands, or from a snapshot."""
+        """Forget all signals: the simulation goes on from where it stands, or from a snapshot."""
         self.exception, self.interrupted = None, False
         self.set_end("")
 
@@ -65,16 +66,20 @@ class Failures:
         self.set_end(self.end or text)
 
     def error(self) -> SimulationError:
-        """Return the exception that was left as an error of the run."""
-        what = f"{type(self.exception).__name__}: {self.exception}"
-        asked = isinstance(self.exception, SimulationError)  # place and time are in it
-        failed = f"{self.participant} failed at t = {self.time:g} s: {what}"
-        error = SimulationError(str(self.exception) if asked else failed)
+        """Return the exception that a callback left as an error of the run."""
+        text = str(self.exception)
+        if not isinstance(self.exception, SimulationError):  # which says place and time itself
+            kind = type(self.exception).__name__
+            text = f"{self.participant} failed at t = {self.time:g} s: {kind}: {text}"
+        error = SimulationError(text)
         error.__cause__ = self.exception
         return error
 
-    def guard(self, name: str, function: Callable[[float, float], None]) -> Any:
-        """Return a C callback that runs `function(t, h)` and turns any exception into status 1."""
+    def callback(self, name: str, function: Callable[[float, float], None]) -> int:
+        """Return the address of a C callback for `function(t, h)`, which turns any exception into status 1.
+
+        The callback lives as long as these signals.
+        """
 
         def guarded(_: int, t: float, h: float) -> int:
             try:
@@ -86,25 +91,26 @@ class Failures:
                 return 1
             return 0
 
-        return KERNEL(guarded)
+        self._callbacks.append(KERNEL(guarded))
+        return ctypes.cast(self._callbacks[-1], ctypes.c_void_p).value or 0
 
 
 @contextmanager
-def ctrl_c(failures: Failures) -> Iterator[None]:
+def ctrl_c(signals: RunSignals) -> Iterator[None]:
     """Note Ctrl-C, to be acted upon between chunks or after a callback.
 
-    Raised at any moment it may strike while Python enters a callback from C, where the
-    exception is printed and lost, and the run goes on. A second Ctrl-C does not wait.
+    KeyboardInterrupt at any moment might be raised while Python enters a callback from C, where
+    it is printed and lost, and the run goes on. A second Ctrl-C is raised at once.
     """
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
 
     def note(number: int, frame: object) -> None:
-        if failures.interrupted:
+        if signals.interrupted:
             raise KeyboardInterrupt
-        failures.interrupted = True
+        signals.interrupted = True
 
     signal.signal(signal.SIGINT, note)
     try:
@@ -122,26 +128,19 @@ class Failing(Protocol):
         """Return the name of the variable at an address."""
 
     def failed(self, status: int, t: float, /) -> str:
-        """Return what a status of one of its operations at t means."""
+        """Return the meaning of a status of one of its operations at t."""
 
     def log(self) -> list[str]:
-        """Return what it logged at warning level and above."""
+        """Return the messages that it logged at warning level and above."""
 
 
-def operation_error(op: Op, instance: Failing, t: float, k: int, status: int) -> SimulationError:
-    """Return what it means that an operation of an instance failed at t, in step k, with a status."""
-    values = {FMI2_VALUES: op.c, FMI3_VALUES: op.c, FROM_FLOAT: op.a, TO_FLOAT: op.b}
-    checked = {CALL: op.b, COMBINE: op.c, **values}
-    if status < 0 and op.code in checked:
-        variable = instance.locate(checked[op.code] + 8 * (-status - 1))
-        what = "is not finite (NaN or infinite)"
-        remedy = "look at the inputs that lead to it, or at the step: a plant that diverges ends so"
-        if op.code == FROM_FLOAT:
-            what, remedy = f"is not {op.number.values}", "round or limit its source in a block"
-        elif op.code == TO_FLOAT and not op.number.is_float:
-            what, remedy = "is above 2^53, which a float does not hold", "do not connect or record it"
+def operation_error(op: Operation, instance: Failing, t: float, k: int, status: int) -> SimulationError:
+    """Return the error of an operation of an instance that failed at t, in step k, with a status."""
+    if status < 0 and op.checked():
+        variable = instance.locate(op.checked() + 8 * (-status - 1))
+        what, remedy = op.fault()
         text = f"{instance.name}.{variable} {what} at t = {t:g} s (step {k}); {remedy}"
     else:
-        text = f"{instance.failed(status, t)} (step {k})"
+        text = f"{instance.failed(ctypes.c_int32(status).value, t)} (step {k})"
     log = "".join(f"\n  {line}" for line in instance.log()[-8:])
     return SimulationError(f"{text}\n  log of the FMU:{log}" if log else text)

@@ -1,14 +1,11 @@
-"""What a run works on: a participant with memory of its own, and the operations that move it.
+"""The running instance of a block or continuous system: its kernels and a copy of its storage.
 
-An instance answers, for its participant, what the master asks at a communication point:
-`read` the outputs, `latch` the inputs, `advance` over the step, and for stage coupling
-set states and get derivatives. KernelInstance does so for blocks and continuous systems
-in the loop; FMUInstance (fmi/instance.py, fmi/model_exchange.py) for FMUs.
+Kernels are compiled, or called back as Python where Numba cannot compile them. Inputs and
+states stay where they lie in the storage, so there is nothing to latch or to set.
 """
 
 from __future__ import annotations
 
-import ctypes
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -19,26 +16,34 @@ from ..codegen.kernels import kernel_addresses
 from ..core.dependencies import dependencies
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
 from ..core.variables import Array
-from ..errors import CompilationError, DeclarationError
-from ..loop.operations import CALL, COPY, Op
-from ..loop.signals import KERNEL, Failures
+from ..errors import CompilationError, DeclarationError, WiringError
+from ..loop.operations import Call, Copy, Operation
+from ..loop.signals import KERNEL
 from ..result import SimulationError
+from .instance import Setting
 
 
 class CompiledKernelsWarning(UserWarning):
-    """A block runs as a Python callback because Numba cannot compile it."""
+    """A participant runs as Python callbacks because Numba cannot compile its kernels."""
 
 
 class KernelInstance:
     """A Block or Continuous in the loop, compiled or called back."""
 
-    def __init__(self, name: str, participant: Participant, jit: bool, failures: Failures) -> None:
+    def __init__(self, name: str, participant: Participant, setting: Setting) -> None:
+        is_continuous = isinstance(participant, Continuous)
+        if setting.is_stage and is_continuous and "derivatives" not in participant.kernels:
+            raise WiringError(
+                f"{name} ({type(participant).__name__}) moves by its advance alone and has no derivatives, "
+                'which stage coupling integrates; use coupling="sampled"'
+            )
         self.name = name
-        self.failures = failures
+        self.signals = setting.signals
+        self.texts: dict[str, Any] = {}  # kernels know numbers only
+        self.text_sources: dict[str, tuple[Any, str]] = {}
         self.participant = participant.fresh()
         self.base = self.participant.memory.ctypes.data
-        self.callbacks: list[Any] = []
-        self.is_compiled = jit and participant.compiled
+        self.is_compiled = setting.plan.jit and participant.compiled
         self._addresses: dict[str, int] = {}
         if self.is_compiled:
             try:
@@ -46,23 +51,21 @@ class KernelInstance:
             except CompilationError as error:
                 warnings.warn(
                     f"{name} runs as a Python callback, about 50 times slower: {error}. "
-                    f"Set compiled = False in {type(participant).__name__} to accept that silently",
+                    f"Set compiled = False in {type(participant).__name__} to accept that",
                     CompiledKernelsWarning,
                     stacklevel=4,
                 )
                 self.is_compiled = False
         if not self.is_compiled:
             for kernel in participant.kernels:
-                callback = failures.guard(name, self._interpreted(kernel))
-                self.callbacks.append(callback)
-                self._addresses[kernel] = ctypes.cast(callback, ctypes.c_void_p).value or 0
+                self._addresses[kernel] = self.signals.callback(name, self._interpreted(kernel))
         states = self.participant.zones["state"]
-        self.n_states = states[1] if isinstance(participant, Continuous) else 0
+        self.n_states = states[1] if is_continuous else 0
         self.state_address = self.base + 8 * states[0]
         self.derivative_address = self.base + 8 * self.participant.zones["derivative"][0]
         outputs = self.participant.zones["output"]
         self._outputs = (self.base + 8 * outputs[0], outputs[1] + states[1])  # the two zones adjoin
-        self.has_outputs = outputs[1] > 0
+        self._has_outputs = outputs[1] > 0
 
     def _interpreted(self, kernel: str) -> Callable[[float, float], None]:
         method = getattr(self.participant, kernel)
@@ -72,16 +75,18 @@ class KernelInstance:
     def start(self, t0: float) -> None:
         """Run `initialize`, interpreted or compiled like everything else."""
         if "initialize" in self._addresses:
+            before = self.participant.memory.copy()
             function = KERNEL(self._addresses["initialize"])
-            if function(self.base, t0, 0.0) != 0 and self.failures.exception is None:
-                again = self.failures.guard(self.name, self._interpreted("initialize"))  # for its exception
+            if function(self.base, t0, 0.0) != 0 and self.signals.exception is None:
+                self.participant.memory[:] = before  # compiled code does not say which exception it was
+                again = KERNEL(self.signals.callback(self.name, self._interpreted("initialize")))
                 if again(self.base, t0, 0.0) == 0:
                     raise SimulationError(f"{self.name} failed in initialize(self); check its parameters")
-        if isinstance(self.participant, LinearContinuous) and self.failures.exception is None:
+        if isinstance(self.participant, LinearContinuous) and self.signals.exception is None:
             self._check_linear(t0)
 
     def _check_linear(self, t0: float) -> None:
-        """Refuse derivatives whose response to states and inputs is no sum, or depends on t."""
+        """Refuse derivatives that are not linear in states and inputs, or depend on t."""
         p, saved = self.participant, self.participant.memory.copy()
         derivatives = KERNEL(self._addresses["derivatives"])
         random = np.random.default_rng(1)
@@ -99,7 +104,7 @@ class KernelInstance:
         later = response(t0 + 1.7, 3, -2)
         p.memory[:] = saved
         bound = 1e-9 * (np.abs(none) + np.abs(one) + np.abs(two) + np.abs(both)).max(initial=1e-300)
-        if self.failures.exception is not None:
+        if self.signals.exception is not None:
             return
         finite = np.isfinite([none, one, two, both, later]).all()
         off = np.abs([none + 3 * (one - none) - 2 * (two - none) - both, later - both])
@@ -113,21 +118,23 @@ class KernelInstance:
         """Nothing to release, nothing that could crash."""
         return ""
 
-    #: Python can be copied, and so can the record
+    #: Python attributes and the storage can be copied
     can_save = can_serialise = True
+    is_gone = False
+    unrepeatable = ""
 
     def kind(self) -> tuple[Any, ...]:
-        """Return what another instance has to share to take back what this one saves."""
+        """Return the properties that another instance must share to take over a saved state."""
         made = type(self.participant)
         return made.__module__, made.__qualname__, self.is_compiled, self.participant.memory.size
 
     def save(self, serialised: bool = True) -> tuple[Array, dict[str, Any]]:
-        """Return a copy of the record, and of what a block in Python keeps beside it."""
+        """Return a copy of the storage, and of the attributes that a block in Python has beside it."""
         attributes = {} if self.is_compiled else self.participant.own_attributes()
         return self.participant.memory.copy(), attributes
 
     def restore(self, saved: Any) -> None:
-        """Take back what `save` returned, which stays as it is."""
+        """Return to a state that `save` returned, which stays valid."""
         memory, attributes = saved
         self.participant.memory[:] = memory
         if not self.is_compiled:
@@ -140,50 +147,55 @@ class KernelInstance:
         """Return the address of a variable."""
         return self.base + 8 * self.participant.variables[port].slot
 
-    def _call(self, kernel: str, text: str, fraction: float, check: tuple[int, int] = (0, 0)) -> Op:
+    def _call(self, kernel: str, text: str, fraction: float, check: tuple[int, int] = (0, 0)) -> Operation:
         how = "" if self.is_compiled else " (Python callback)"
-        return Op(
-            f"{self.name}: {text}{how}" if text else "",
-            CALL,
-            self._addresses[kernel],
-            self.base,
-            check[0],
-            n=check[1],
+        return Call(
+            text=f"{self.name}: {text}{how}" if text else "",
+            function=self._addresses[kernel],
+            storage=self.base,
+            results=check[0],
+            count=check[1],
             fraction=fraction,
             participant=self.name,
         )
 
-    def step(self, fraction: float = 0.0) -> list[Op]:
+    def step(self, fraction: float = 0.0) -> list[Operation]:
         """Run a block."""
         return [self._call("step", "step", fraction, self._outputs)]
 
-    def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
+    def read(self, fraction: float = 0.0, final: bool = True) -> list[Operation]:
         """Evaluate derivatives and outputs; they must be finite unless inputs are still to come."""
+        if not self._has_outputs:
+            return []
         ops = [self._call("derivatives", "", fraction)] if "derivatives" in self._addresses else []
         if "outputs" in self._addresses:
             ops.append(self._call("outputs", "outputs", fraction, self._outputs if final else (0, 0)))
         return ops
 
-    def latch(self) -> list[Op]:
+    def read_texts(self) -> list[Operation]:
+        """There are no strings or binary data."""
+        return []
+
+    def latch(self) -> list[Operation]:
         """Inputs are read where they lie."""
         return []
 
-    def advance(self) -> list[Op]:
+    def advance(self) -> list[Operation]:
         """Carry the states over the step."""
         return [self._call("advance", "advance", 0.0, (self.state_address, self.n_states))]
 
-    def set_states(self, fraction: float) -> list[Op]:
+    def set_states(self, fraction: float) -> list[Operation]:
         """States are combined where they lie."""
         return []
 
-    def derivatives(self, target: int, fraction: float) -> list[Op]:
+    def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Evaluate the derivatives and copy them to `target`."""
         if not self.n_states:
             return []
-        copy = Op("", COPY, a=self.derivative_address, b=target, n=self.n_states, weights=(1.0, 0.0))
+        copy = Copy(source=self.derivative_address, target=target, count=self.n_states)
         return [self._call("derivatives", "derivatives", fraction), copy]
 
-    def complete(self) -> list[Op]:
+    def complete(self) -> list[Operation]:
         """Nothing happens between steps."""
         return []
 
@@ -203,14 +215,9 @@ class KernelInstance:
         return "?"
 
     def failed(self, status: int, t: float) -> str:
-        """Return what it means that a kernel failed."""
+        """Return the meaning of a kernel that failed."""
         return f"{self.name} failed with an exception in its kernel (jit=False shows where) at t = {t:g} s"
 
     def log(self) -> list[str]:
         """Kernels do not log."""
         return []
-
-
-def buffer(n: int) -> Array:
-    """Return memory for n floats; never empty, so that it has an address."""
-    return np.zeros(max(n, 1))

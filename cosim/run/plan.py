@@ -1,86 +1,106 @@
-"""What a run is asked for: its options, checked, and the ports that are recorded."""
+"""The plan of a run: all of its options, checked once, and the ports that it records."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from numbers import Integral, Real
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from ..core.port import Port
 from ..core.tableaus import TABLEAUS
-from ..errors import TimeError, WiringError, did_you_mean
+from ..core.time_grid import steps_between
+from ..errors import OptionError, TimeError, WiringError, did_you_mean
 from ..system.system import System
 
 Coupling = Literal["sampled", "iterated", "continuous"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4"]
 
 
-def check_system(system: object) -> None:
-    """Refuse what is no system."""
-    if not isinstance(system, System):
-        raise WiringError(f"{system!r} is no System; give System({{'plant': ...}}, [...])")
+@dataclass(frozen=True, kw_only=True)
+class RunPlan:
+    """The options of a run, which `simulate` explains; wrong ones are refused when the plan is made.
 
+    It goes whole to the instances, the couplings and the recorder, and a branch of a simulation
+    is made from it again. `record` and `statistics` become tuples of names.
+    """
 
-def check_time(step: float, start: float) -> None:
-    """Refuse what is no step or no start, in s."""
-    _check_seconds("step", step)
-    _check_seconds("start", start)
-    if step <= 0.0:
-        raise TimeError(f"step={step:g} s; a communication step is above zero")
+    step: float
+    start: float = 0.0
+    coupling: Coupling = "sampled"
+    solver: Solver = "ode3"
+    record: Iterable[str] | None = None
+    statistics: Iterable[str] | None = None
+    decimation: int = 1
+    jit: bool = True
+    tolerance: float = 1e-8
 
+    def __post_init__(self) -> None:
+        """Check the options; turn numbers and names into one type each."""
+        step, start = _seconds("step", self.step), _seconds("start", self.start)
+        if step <= 0.0:
+            raise TimeError(f"step={step:g} s; a communication step must be above zero")
+        for name, value, known in (
+            ("coupling", self.coupling, get_args(Coupling)),
+            ("solver", self.solver, tuple(TABLEAUS)),
+        ):
+            if value not in known:
+                raise OptionError(f"{name} '{value}' is not known" + did_you_mean(value, known))
+        if not isinstance(self.decimation, Integral) or self.decimation < 1:
+            raise OptionError(f"decimation={self.decimation!r} must be a whole number of steps, 1 or more")
+        if not (isinstance(self.tolerance, Real) and 0.0 < float(self.tolerance) < 1.0):
+            raise OptionError(
+                f"tolerance={self.tolerance!r} must be a number between 0 and 1: it is relative to the size "
+                "of each exchanged value"
+            )
+        checked: dict[str, Any] = {"step": step, "start": start, "decimation": int(self.decimation)}
+        checked |= {"record": _port_names(self.record), "statistics": _port_names(self.statistics)}
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
-def check_stop(stop: float, start: float) -> None:
-    """Refuse what is no stop after a start, in s."""
-    _check_seconds("stop", stop)
-    if stop <= start:
-        raise TimeError(f"stop={stop:g} s is not after start={start:g} s")
+    def point(self, stop: float) -> int:
+        """Return the k of a later time, in s; refuse one that is not a communication point."""
+        stop = _seconds("stop", stop)
+        if stop <= self.start:
+            raise TimeError(f"stop={stop:g} s is not after start={self.start:g} s")
+        return steps_between(stop - self.start, self.step, "the time from start to stop")
 
-
-def _check_seconds(name: str, value: object) -> None:
-    if not isinstance(value, Real) or not math.isfinite(value):
-        raise TimeError(f"{name}={value!r} is no finite number of seconds")
-
-
-def check_choices(coupling: str, solver: str, decimation: int, tolerance: float) -> None:
-    """Refuse a coupling, a solver, a decimation or a tolerance that is none."""
-    if coupling not in get_args(Coupling):
-        raise TimeError(f"coupling '{coupling}' is not known" + did_you_mean(coupling, get_args(Coupling)))
-    if solver not in tuple(TABLEAUS):
-        raise TimeError(f"solver '{solver}' is not known" + did_you_mean(solver, TABLEAUS))
-    if not isinstance(decimation, Integral) or decimation < 1:
-        raise TimeError(f"decimation={decimation!r} is no whole number of steps, 1 or more")
-    if not (isinstance(tolerance, Real) and 0.0 < float(tolerance) < 1.0):
-        raise TimeError(f"tolerance={tolerance!r} is no relative tolerance; it lies between 0 and 1")
-
-
-def port_names(names: Iterable[str]) -> list[str]:
-    """Return names of ports as a list; refuse what is none."""
-    if isinstance(names, str):
-        raise WiringError(f"'{names}' is one name; give a list of ports, [\"{names}\"]")
-    found = list(names) if isinstance(names, Iterable) else [None]
-    if not all(isinstance(name, str) for name in found):
-        raise WiringError(f'{names!r} is no list of ports, such as ["plant.x"]')
-    return found
-
-
-def ports(system: System, names: list[str] | None) -> list[Port]:
-    """Return the ports with these names; None means every declared output and state."""
-    if names is None:
+    def recorded(self, system: System) -> list[Port]:
+        """Return the ports to record: numbers, strings and binary data."""
+        if self.record is not None:
+            return [_readable(system, name) for name in self.record]
         return [
             system.port(f"{name}.{port}", "output")
             for name, component in system.participants.items()
             for port in component.declared_outputs
         ]
-    return [_readable(system, name) for name in names]
+
+    def watched(self, system: System) -> list[Port]:
+        """Return the ports to keep statistics of; refuse strings and binary data that are asked for."""
+        if self.statistics is None:
+            return [port for port in self.recorded(system) if port.kind == "number"]
+        ports = [_readable(system, name) for name in self.statistics]
+        for port in ports:
+            if port.kind != "number":
+                raise WiringError(f"{port} is a {port.kind}; statistics are of numbers, so leave it out")
+        return ports
 
 
-def numbers(ports: Iterable[Port]) -> list[Port]:
-    """Return the ports; refuse strings and binary data."""
-    found = list(ports)
-    for port in found:
-        if port.kind != "number":
-            raise WiringError(f"{port} is a {port.kind}; statistics are of numbers, so leave it out")
+def _seconds(name: str, value: object) -> float:
+    if not isinstance(value, Real) or not math.isfinite(value):
+        raise TimeError(f"{name}={value!r} must be a finite number of seconds")
+    return float(value)
+
+
+def _port_names(names: Iterable[str] | None) -> tuple[str, ...] | None:
+    if names is None:
+        return None
+    if isinstance(names, str):
+        raise WiringError(f"'{names}' is one name; give a list of ports, [\"{names}\"]")
+    found = tuple(names) if isinstance(names, Iterable) else (None,)
+    if not all(isinstance(name, str) for name in found):
+        raise WiringError(f'{names!r} must be a list of ports, such as ["plant.x"]')
     return found
 
 

@@ -7,15 +7,19 @@
         simulation.restore(there)
         same = simulation.run(10.0)
 
-Time is the integer k, t_k = start + k step; nothing is summed up. What happens at a
-communication point is in program.py, and `Result.schedule` shows it for the run.
-`simulate` (master.py) is one run from start to stop.
+`simulate` is one run from start to stop. Time is the integer k, t_k = start + k step; nothing
+is summed up. A run is put together in four steps, each in a file of its own:
+
+    plan.py      the options, checked
+    binding.py   the components of the system as running instances, its connections as copies
+    coupling/    the operations of a communication step, in their order: `Result.schedule`
+    recorder.py  signals, texts and statistics, recorded at communication points
+
+and then carried out by the compiled loop (cosim/loop).
 """
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -23,42 +27,94 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
-from ..core.time_grid import steps_between
 from ..core.variables import Array
-from ..errors import RecordError, SimulationEndedWarning, SnapshotError, TimeError
-from ..fmi.instance.instance import FMUInstance
+from ..errors import SimulationEndedWarning, SnapshotError, TimeError, WiringError
 from ..loop.loop import Loop
-from ..loop.signals import EndOfRun, ctrl_c
-from ..result import Interrupted, Result, SimulationError, Statistics
+from ..loop.signals import EndOfRun, RunSignals, ctrl_c
+from ..result import Interrupted, Result, SimulationError
 from ..system.system import System
-from .plan import (
-    Coupling,
-    Solver,
-    check_choices,
-    check_stop,
-    check_system,
-    check_time,
-    numbers,
-    port_names,
-    ports,
-)
-from .program import Program
+from .binding import Binding
+from .coupling.iterated import iterated
+from .coupling.sampled import sampled
+from .coupling.schedule import Schedule
+from .coupling.stage import stage
+from .plan import Coupling, RunPlan, Solver
+from .recorder import Recorder
 
-#: recorded signals above this many bytes go to a temporary file
-MEMORY_LIMIT = 200_000_000
+
+def simulate(
+    system: System,
+    *,
+    step: float,
+    stop: float,
+    start: float = 0.0,
+    coupling: Coupling = "sampled",
+    solver: Solver = "ode3",
+    record: Iterable[str] | None = None,
+    statistics: Iterable[str] | None = None,
+    decimation: int = 1,
+    jit: bool = True,
+    tolerance: float = 1e-8,
+    progress: Callable[[int, int], None] | None = None,
+) -> Result:
+    """Run a system from `start` to `stop` with the communication step `step`, in s.
+
+    coupling
+        "sampled": as a real controller; inputs are held over a step.
+        "continuous": stage coupling, everything with continuous state is integrated
+        together by `solver` (ode1 to ode4), blocks run at every stage.
+        "iterated": as sampled, but FMUs and Continuous participants that are connected
+        directly agree at every communication point, by repeating steps
+    record
+        ports to record, such as "plant.x"; None records every output and state
+    statistics
+        ports to keep statistics of; None takes the recorded ones
+    decimation
+        record every n-th communication point
+    jit
+        False calls every kernel as Python: for a debugger
+    tolerance
+        of iterated coupling, relative to the size of each exchanged value
+    progress
+        called with (steps done, steps in all) about ten times a second
+
+    Raises CosimError for anything that can be checked before the run, SimulationError (with
+    `result`, computed until then) when a participant fails or gives a value that is not
+    finite, Interrupted (with `result`) on Ctrl-C. When a participant asks to end the run,
+    that is not an error: the result up to there is returned, `result.ended` says which
+    participant asked and when, and SimulationEndedWarning is warned.
+    """
+    plan = RunPlan(
+        step=step,
+        start=start,
+        coupling=coupling,
+        solver=solver,
+        record=record,
+        statistics=statistics,
+        decimation=decimation,
+        jit=jit,
+        tolerance=tolerance,
+    )
+    plan.point(stop)  # before FMUs are loaded
+    with Simulation(system, **vars(plan)) as simulation:
+        return simulation.run(stop, progress)
+
+
+def schedule(system: System, *, step: float, coupling: Coupling = "sampled", solver: Solver = "ode3") -> str:
+    """Return the operations of one communication step, one line per operation."""
+    with Simulation(system, step=step, coupling=coupling, solver=solver, record=[]) as simulation:
+        return simulation.schedule
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """All that a simulation knows at a communication point.
+    """The state of a simulation at a communication point.
 
     time
         of the point, in s
     portable
         False when an FMU cannot serialise its state: then the snapshot serves only the
-        simulation that it was taken of, while that is open
+        simulation that it was taken from, while that is open
     """
 
     time: float
@@ -68,15 +124,15 @@ class Snapshot:
     parts: dict[str, Any]
     memory: list[Array]
     owner: object
-    #: what a simulation has to share to return to it
+    #: the properties that a simulation must share to return to it
     kind: tuple[Any, ...]
 
 
 class Simulation:
     """A system at a communication point. Options as for `simulate`.
 
-    Raises CosimError for what can be checked before the run. To be closed, or used in
-    a `with` statement: it holds instances of FMUs.
+    Raises CosimError for anything that can be checked before the run. A simulation holds
+    instances of FMUs: close it, or use it in a `with` statement.
     """
 
     def __init__(
@@ -93,37 +149,52 @@ class Simulation:
         jit: bool = True,
         tolerance: float = 1e-8,
     ) -> None:
-        check_system(system)
-        check_time(step, start)
-        check_choices(coupling, solver, decimation, tolerance)
+        if not isinstance(system, System):
+            raise WiringError(f"{system!r} must be a System; give System({{'plant': ...}}, [...])")
         self.system = system
-        self.step, self.start, self.decimation = float(step), float(start), int(decimation)
-        self._options: dict[str, Any] = {
-            "coupling": coupling,
-            "solver": solver,
-            "record": None if record is None else port_names(record),
-            "statistics": None if statistics is None else port_names(statistics),
-            "jit": jit,
-            "tolerance": tolerance,
-        }
-        asked = ports(system, self._options["record"])
-        texts = [port for port in asked if port.kind != "number"]
-        recorded = [port for port in asked if port.kind == "number"]
-        watched = recorded if statistics is None else numbers(ports(system, self._options["statistics"]))
-        self._program = Program(
-            system, self.step, coupling, solver, recorded, watched, self.decimation, jit, tolerance, texts
+        self.plan = plan = RunPlan(
+            step=step,
+            start=start,
+            coupling=coupling,
+            solver=solver,
+            record=record,
+            statistics=statistics,
+            decimation=decimation,
+            jit=jit,
+            tolerance=tolerance,
         )
+        recorded, watched = plan.recorded(system), plan.watched(system)
+        self._signals = RunSignals()
+        self._binding = Binding(system, plan, [*recorded, *watched], self._signals)
+        try:
+            self._recorder = Recorder(recorded, watched, plan.decimation, self._binding, self._signals)
+            self._coupling = self._coupled()
+        except BaseException:
+            self._binding.close()
+            raise
+        self._recording = [*self._recorder.operations, *self._binding.keep]
+        #: the arrays that belong to the state, beside those of the instances
+        self._memory = [*self._binding.memory, *self._coupling.memory]
         self._loop: Loop | None = None
         #: the point that comes next, or, once its outputs have been evaluated, the present one
         self._k, self._acted = 0, False
         self._incomplete = self._closed = False
-        #: who asked to end the run, and when
+        #: the participant that asked to end the run, and when
         self._ended = ""
         self._token = object()
         self._first = 0
-        self._data: Array = np.empty((0, 0))
         self._began = 0.0
         self._last: Result | None = None
+
+    def _coupled(self) -> Schedule:
+        if self.plan.coupling == "continuous":
+            return stage(self._binding, self._recorder)
+        return (iterated if self.plan.coupling == "iterated" else sampled)(self._binding)
+
+    @property
+    def schedule(self) -> str:
+        """The operations of one communication step, one line per operation."""
+        return self._coupling.text(self._recording)
 
     def __enter__(self) -> Self:
         return self
@@ -135,19 +206,19 @@ class Simulation:
             self.close()
         elif not self._closed:
             self._closed = True
-            self._program.close()
+            self._binding.close()
 
     def close(self) -> None:
         """Terminate and free the FMUs; results stay.
 
-        Raises SimulationError when an isolated FMU crashes in that, Interrupted on Ctrl-C while
-        it hangs in that, both with the last `result`.
+        Raises SimulationError when an isolated FMU crashes while it is freed, Interrupted on Ctrl-C
+        while it hangs there, both with the last `result`.
         """
         if self._closed:
             return
         self._closed = True
-        crashes = self._program.close()
-        if self._program.failures.interrupted:
+        crashes = self._binding.close()
+        if self._signals.interrupted:
             raise Interrupted(self._last) if self._last is not None else KeyboardInterrupt
         if crashes:
             error = SimulationError("; ".join(crashes) + ", after the run, which is complete")
@@ -157,25 +228,25 @@ class Simulation:
     @property
     def time(self) -> float:
         """The communication point at which the simulation stands, in s."""
-        return self.start + self._k * self.step
+        return self.plan.start + self._k * self.plan.step
 
     # ----------------------------------------------------------------------------- runs
 
     def run(self, until: float, progress: Callable[[int, int], None] | None = None) -> Result:
-        """Run from the present communication point to `until`, in s; both are in the result.
+        """Run from the present communication point to `until`, in s; the result has both.
 
-        Raises SimulationError (with `result`, what was computed) when a participant fails
+        Raises SimulationError (with `result`, computed until then) when a participant fails
         or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C. When a
-        participant asks to end the run, what was computed is returned: `Result.ended`.
+        participant asks to end the run, the result until then is returned: `Result.ended`.
         """
-        check_stop(until, self.start)
-        last = steps_between(until - self.start, self.step, "the time from start to stop")
+        last = self.plan.point(until)
         if last < self._k or (last == self._k and self._acted):
             raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
-        with ctrl_c(self._program.failures):
+        with ctrl_c(self._signals):
             self._check_usable("run")
             loop = self._begun()
-            self._open_records(loop, last)
+            self._first = self._k
+            self._recorder.open(self._k, last)
             self._last = self._run(loop, last, progress)
             return self._last
 
@@ -184,57 +255,23 @@ class Simulation:
         if self._loop is None:
             self._incomplete = True
             self._began = time.perf_counter()
-            self._loop = self._program.loop()
-            self._data = np.empty((0, self._program.columns))
+            self._loop = Loop(
+                self._coupling.at_point, self._recording, self._coupling.to_next, self._signals.stop
+            )
             try:
-                self._program.start(self.start)
+                self._binding.start(self.plan.start)
+                self._coupling.start()
             except SimulationError as error:
                 error.result = self._result(interrupted=True)
                 raise
             except KeyboardInterrupt:
-                self._program.failures.clear()
+                self._signals.clear()
                 raise Interrupted(self._result(interrupted=True)) from None
             self._incomplete = False
         return self._loop
 
-    def _open_records(self, loop: Loop, last: int) -> None:
-        """Make room for what is recorded from here on; the present point is the first if it was computed."""
-        program = self._program
-        self._data = self._room(last)
-        self._first = self._k
-        loop.record_to(self._data)
-        loop.report[:] = 0
-        program.statistics[:] = np.inf, -np.inf, 0.0, 0.0
-        for texts in program.recorded_texts.values():
-            texts.clear()
-        if self._acted:
-            x = program.values(program.watched_addresses)
-            if len(x):
-                program.statistics[:] = np.column_stack([x, x, x, x * x])
-            loop.report[4] = 1
-            if self._k % self.decimation == 0 and (program.columns or program.recorded_texts):
-                self._data[0] = program.values(program.recorded_addresses)
-                program.keep_texts()
-                loop.report[3] = 1
-
-    def _room(self, last: int) -> Array:
-        rows = last // self.decimation - -(-self._k // self.decimation) + 1
-        columns = self._program.columns
-        size = rows * columns * 8
-        if size <= MEMORY_LIMIT:
-            return np.empty((rows, columns))
-        folder = tempfile.gettempdir()
-        free = shutil.disk_usage(folder).free
-        if size > free:
-            raise RecordError(
-                f"{columns} numbers at {rows} points take {size / 1e9:.3g} GB and {folder} has "
-                f"{free / 1e9:.3g} GB free; record fewer ports (record=[...]), or with decimation="
-            )
-        file = tempfile.TemporaryFile(prefix="structcosim-")  # noqa: SIM115  lives as long as the arrays
-        return np.memmap(file, dtype=np.float64, mode="w+", shape=(rows, columns))
-
     def _run(self, loop: Loop, last: int, progress: Callable[[int, int], None] | None) -> Result:
-        failures = self._program.failures
+        signals, plan = self._signals, self.plan
         self._began = time.perf_counter()
         begin, chunk = self._k, 1  # grows: a slow callback must not hold up progress and Ctrl-C
         try:
@@ -242,27 +279,27 @@ class Simulation:
                 until = min(self._k + chunk, last + 1)
                 before = time.perf_counter()
                 self._incomplete = True  # until the loop is back
-                if loop.run(self._k, until, last, self.start, self.step, self._acted):
-                    row, self._k, status = (int(x) for x in loop.report[:3])
+                if loop.run(self._k, until, last, plan.start, plan.step, self._acted):
+                    self._k = int(loop.report[1])
                     self._acted = False
-                    if isinstance(failures.exception, KeyboardInterrupt):
-                        raise failures.exception
-                    if isinstance(failures.exception, EndOfRun):
-                        return self._end(failures.exception.text)
-                    raise self._program.error(loop.rows[row], self.start, self._k, status)
+                    if isinstance(signals.exception, KeyboardInterrupt):
+                        raise signals.exception
+                    if isinstance(signals.exception, EndOfRun):
+                        return self._end(signals.exception.text)
+                    raise self._binding.error(loop)
                 self._k = int(loop.report[1])
                 self._acted = self._k < until  # the last point, or where a participant asked to end
-                if failures.end and self._acted:
-                    return self._end(failures.end)
+                if signals.end and self._acted:
+                    return self._end(signals.end)
                 self._incomplete = False
-                if failures.interrupted:
+                if signals.interrupted:
                     raise KeyboardInterrupt
                 took = time.perf_counter() - before
                 chunk = max(1, min(int(chunk * 0.1 / max(took, 1e-6)), 4 * chunk, 1_000_000))
                 if progress is not None:
                     progress(self._k - begin, last - begin)
         except KeyboardInterrupt:
-            failures.clear()
+            signals.clear()
             raise Interrupted(self._result(interrupted=True)) from None
         except SimulationError as error:
             error.result = self._result(interrupted=True)
@@ -278,9 +315,9 @@ class Simulation:
     # ------------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> Snapshot:
-        """Return all that the simulation knows now; `restore` returns to it, as often as you like.
+        """Return the whole state of the simulation; `restore` returns to it, as often as you like.
 
-        Raises SnapshotError, naming them, when FMUs cannot get and set their state.
+        Raises SnapshotError, naming the FMUs, when they cannot get and set their state.
         """
         self._check_usable("take a snapshot")
         self._begun()
@@ -290,45 +327,45 @@ class Simulation:
                 f"{unable} cannot get and set its state (canGetAndSetFMUState), which a snapshot needs; "
                 "export it with that capability, or run again from the start"
             )
-        parts = {name: instance.save() for name, instance in self._program.instances.items()}
-        portable = all(instance.can_serialise for instance in self._program.instances.values())
-        memory = [array.copy() for array in self._program.memory]
+        parts = {name: instance.save() for name, instance in self._binding.instances.items()}
+        portable = all(instance.can_serialise for instance in self._binding.instances.values())
+        memory = [array.copy() for array in self._memory]
         place = self._k, self._acted
         return Snapshot(self.time, portable, place, parts, memory, self._token, self._kind())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Return to a snapshot; what was recorded since then stays in the results that were returned.
+        """Return to a snapshot; signals recorded since then stay in the results that were returned.
 
-        One that was taken of another simulation serves if that has the same participants and
-        options. Raises SnapshotError if it does not serve.
+        A snapshot of another simulation serves if that one has the same participants and
+        options. Raises SnapshotError if it does not.
         """
         self._check_open("restore a snapshot")
         if not isinstance(snapshot, Snapshot):
-            raise SnapshotError(f"{snapshot!r} is no snapshot; give what `snapshot` returned")
+            raise SnapshotError(f"{snapshot!r} must be a snapshot, as `snapshot` returns it")
         if snapshot.kind != self._kind():
             raise SnapshotError(
                 f"the snapshot at t = {snapshot.time:g} s is of another simulation: participants, connected "
-                "and recorded ports, step, start, coupling, solver and jit have to be the same"
+                "and recorded ports, step, start, coupling, solver and jit must be the same"
             )
         if snapshot.owner is not self._token and not snapshot.portable:
             raise SnapshotError(
-                f"the snapshot at t = {snapshot.time:g} s serves only the simulation that it was taken of: "
+                f"the snapshot at t = {snapshot.time:g} s serves only the simulation that it was taken from: "
                 f"{self._unable('can_serialise')} cannot serialise its state"
             )
         self._begun()
-        for name, instance in self._program.instances.items():
+        for name, instance in self._binding.instances.items():
             instance.restore(snapshot.parts[name])
-        for array, kept in zip(self._program.memory, snapshot.memory, strict=True):
+        for array, kept in zip(self._memory, snapshot.memory, strict=True):
             array[:] = kept
         self._k, self._acted = snapshot.place
         self._incomplete, self._ended = False, ""
-        self._program.failures.clear()
+        self._signals.clear()
 
     def branch(self) -> Simulation:
-        """Return a second simulation that stands where this one does, and goes its own way.
+        """Return a second simulation at the same point, which goes its own way.
 
-        Raises SnapshotError, naming them, when FMUs cannot serialise their state, or do not bear it
-        in another process.
+        Raises SnapshotError, naming the FMUs, when they cannot serialise their state, or crash when
+        they take it over in another process.
         """
         snapshot = self.snapshot()
         if not snapshot.portable:
@@ -336,21 +373,18 @@ class Simulation:
                 f"{self._unable('can_serialise')} cannot serialise its state (canSerializeFMUState), "
                 "which a second simulation needs; snapshot and restore serve within one simulation"
             )
-        other = Simulation(
-            self.system, step=self.step, start=self.start, decimation=self.decimation, **self._options
-        )
+        other = Simulation(self.system, **vars(self.plan))
         try:
             other.restore(snapshot)
         except SimulationError as error:
-            instances = other._program.instances
-            crashed = ", ".join(n for n, i in instances.items() if isinstance(i, FMUInstance) and i.is_gone)
+            crashed = ", ".join(n for n, i in other._binding.instances.items() if i.is_gone)
             other.close()
             if not crashed:
                 raise
             raise SnapshotError(
                 f"{error}\nthe bytes that {crashed} gives of its state do not serve in another process, "
-                "perhaps because there are addresses among them; a branch needs it without isolated=True, "
-                "and this simulation goes on"
+                "perhaps because they contain addresses; for a branch, load it without isolated=True; "
+                "this simulation goes on"
             ) from error
         except BaseException:
             other.close()
@@ -358,12 +392,13 @@ class Simulation:
         return other
 
     def _kind(self) -> tuple[Any, ...]:
-        options = tuple(self._options[name] for name in ("coupling", "solver"))
-        parts = tuple((name, instance.kind()) for name, instance in self._program.instances.items())
-        return self.step, self.start, options, parts, tuple(array.shape for array in self._program.memory)
+        plan = self.plan
+        parts = tuple((name, instance.kind()) for name, instance in self._binding.instances.items())
+        shapes = tuple(array.shape for array in self._memory)
+        return plan.step, plan.start, plan.coupling, plan.solver, parts, shapes
 
     def _unable(self, capability: str) -> str:
-        found = [n for n, i in self._program.instances.items() if not getattr(i, capability)]
+        found = [n for n, i in self._binding.instances.items() if not getattr(i, capability)]
         return ", ".join(found)
 
     def _check_open(self, what: str) -> None:
@@ -379,41 +414,12 @@ class Simulation:
     # ---------------------------------------------------------------------------- ends
 
     def _result(self, interrupted: bool = False) -> Result:
-        program = self._program
-        assert self._loop is not None
-        rows, sampled = (int(n) for n in self._loop.report[3:])
-        signals: dict[str, Array] = {}
-        column = 0
-        for port in program.recorded:
-            part = self._data[:rows, column : column + port.count]
-            signals[str(port)] = part[:, 0] if port.shape == () or port.count == 1 else part
-            column += port.count
-        first = -(-self._first // self.decimation)
-        k = (first + np.arange(rows, dtype=np.float64)) * self.decimation
         return Result(
-            time=self.start + k * self.step,
-            signals=signals,
-            units={str(p): p.unit for p in [*program.recorded, *program.watched]},
-            texts={str(port): texts[:rows] for port, texts in program.recorded_texts.items()},
-            statistics=self._statistics(sampled),
-            step=self.step,
+            **self._recorder.recording(self.plan.start, self.plan.step),
+            step=self.plan.step,
             steps=self._k - self._first,
             seconds=time.perf_counter() - self._began,
-            schedule=program.schedule(),
+            schedule=self.schedule,
             interrupted=interrupted,
             ended=self._ended,
         )
-
-    def _statistics(self, n: int) -> dict[str, Statistics]:
-        found: dict[str, Statistics] = {}
-        if n == 0:
-            return found
-        row = 0
-        for port in self._program.watched:
-            low, high, total, squares = self._program.statistics[row : row + port.count].T.copy()
-            row += port.count
-            values: list[Any] = [low, high, total / n, np.sqrt(squares / n), np.sqrt(squares)]
-            if port.shape == () or port.count == 1:
-                values = [float(v[0]) for v in values]
-            found[str(port)] = Statistics(*values)
-        return found

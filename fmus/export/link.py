@@ -29,7 +29,7 @@ from cosim.codegen.c_compiler import (
     host,
     zig_cc,
 )
-from cosim.codegen.kernels import LIBM, cache_directory, remedy
+from cosim.codegen.kernels import cache_directory
 from cosim.core.variables import KINDS, Variable
 
 KERNELS = ("initialize", "derivatives", "outputs", "advance", "step")
@@ -77,27 +77,10 @@ def _sources(fmi_version: str) -> list[Path]:
 
 def build_model(participant: Participant, identifier: str, fmi_version: str, kernels: str) -> Model:
     """Return the model of a participant whose kernels have been lowered to `kernels`."""
-    check_symbols(kernels, identifier)
     start = participant.memory.astype("<f8")
     if (kept := participant.variables.get("hold_step")) is not None and kept.kind == "local":
         start[kept.slot] = 0.0  # matrices of an earlier advance may not survive other parameters
     return Model(identifier, fmi_version, kernels, _table(participant, identifier), start.tobytes())
-
-
-# ------------------------------------------------------------------------ symbols
-
-
-def check_symbols(ir: str, identifier: str) -> None:
-    """Refuse IR that needs more than libm, naming the symbol and the kernels that need it."""
-    needed = set(re.findall(r'^declare\b[^@\n]*@"?([^"(\s]+)"?\(', ir, re.MULTILINE))
-    for symbol in sorted(needed):
-        if symbol.startswith("llvm.") or symbol in LIBM:
-            continue
-        kernels = [name for name in KERNELS if symbol in reachable(ir, name)]
-        raise ExportError(
-            f"{identifier}: kernel {' and '.join(kernels) or '?'} needs '{symbol}', "
-            f"which no FMU has: {remedy(symbol)}"
-        )
 
 
 def reachable(ir: str, kernel: str) -> dict[str, str]:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-import cosim.run.simulation
+import cosim.run.recorder
 from cosim import RecordError, Result, Statistics, System, WiringError, simulate
 from tests.cosim.parts import Counter, Gain, Mass
 from tests.cosim.system.test_system import Three
@@ -81,7 +81,7 @@ def test_inputs_slices_and_everything_can_be_recorded():
 
 def test_long_records_spill_to_a_file(monkeypatch):
     wanted = simulate(loop(), step=0.01, stop=3.0)
-    monkeypatch.setattr(cosim.run.simulation, "MEMORY_LIMIT", 1000)
+    monkeypatch.setattr(cosim.run.recorder, "MEMORY_LIMIT", 1000)
     found = simulate(loop(), step=0.01, stop=3.0)
     assert isinstance(found["plant.x"].base, np.memmap)
     for name in wanted.signals:

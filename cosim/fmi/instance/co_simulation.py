@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ...loop.operations import SLACK, Op
-from ...loop.signals import Failures
+from ...loop.fmi_operations import FMI2DoStep, FMI3DoStep
+from ...loop.operations import SLACK, Operation
+from ...loop.signals import RunSignals
 from ...result import SimulationError
 from ..fmu_file import FMUFile
 from .driver import DISCARD
@@ -26,16 +27,15 @@ class CoSimulationInstance(EventInstance):
         self,
         name: str,
         fmu: FMUFile,
-        failures: Failures,
+        signals: RunSignals,
         used: set[str],
         h: float,
         event_mode: bool,
         isolated: bool,
     ) -> None:
-        super().__init__(name, fmu, failures, used, event_mode, isolated)
+        super().__init__(name, fmu, signals, used, event_mode, isolated)
         self._timers = Timers(self.driver, fmu.clocks.values(), h)
         self.event_mode = event_mode
-        self.step_callbacks: list[Any] = []
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and, in event mode, the events of the start."""
@@ -49,23 +49,26 @@ class CoSimulationInstance(EventInstance):
     def _due(self, t: float) -> list[int]:
         return self._timers.due(t)
 
-    def step(self, fraction: float = 0.0) -> list[Op]:
+    def step(self, fraction: float = 0.0) -> list[Operation]:
         """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
         stepped = (replace(op, fraction=fraction) for op in self.advance())
         read = [*self.read(), *self.read_texts()]
         return [*self.latch(), *stepped, *(replace(op, text="") for op in read)]
 
-    def advance(self) -> list[Op]:
+    def advance(self) -> list[Operation]:
         """Do the step."""
-        version, answer = self.fmu.version, self.driver.answer
-        function = self._function(f"{version.prefix}DoStep")
-        op = Op(f"{self.name}: step (FMU)", version.do_step, function, self._component)
+        common: dict[str, Any] = {
+            "text": f"{self.name}: step (FMU)",
+            "participant": self.name,
+            "function": self._function(f"{self.fmu.version.prefix}DoStep"),
+            "component": self._component,
+        }
+        answer = self.driver.answer
         if answer is None:
-            callback = self._callback(self.step_callbacks, self._discarded)
-        else:
-            op = replace(op, b=int(answer.flags.ctypes.data), c=int(answer.times.ctypes.data))
-            callback = self._callback(self.step_callbacks, lambda t, h: self.driver.finish_step(t, h, self))
-        return [replace(op, d=callback, participant=self.name)]
+            return [FMI2DoStep(discarded=self.signals.callback(self.name, self._discarded), **common)]
+        flags, times = int(answer.flags.ctypes.data), int(answer.times.ctypes.data)
+        finish = self.signals.callback(self.name, lambda t, h: self.driver.finish_step(t, h, self))
+        return [FMI3DoStep(flags=flags, times=times, interrupted=finish, **common)]
 
     def _discarded(self, t: float, h: float) -> None:
         """Find out why FMI 2.0 discarded a step: to end the run, or because it failed."""

@@ -29,7 +29,7 @@ import numpy as np
 from ...core.variables import Array
 from ...errors import FMUError, WiringError
 from ...loop.operations import SLACK
-from ...loop.signals import Failures, ctrl_c
+from ...loop.signals import RunSignals, ctrl_c
 from ...result import SimulationError
 from ..file.shared_library import check_library, library_name
 from ..fmu_file import FMUFile
@@ -102,13 +102,13 @@ class Driver(ABC):
         file: FMUFile,
         name: str,
         model_exchange: bool,
-        failures: Failures,
+        signals: RunSignals,
         event_mode: bool = False,
         isolated: bool = False,
     ) -> None:
         self.file = file
         self.name = name
-        self.failures = failures
+        self.signals = signals
         self.model_exchange = model_exchange
         #: whether Co-Simulation handles events outside its steps
         self.event_mode = event_mode
@@ -128,10 +128,10 @@ class Driver(ABC):
         check_library(library)
         self._check_alone()
         try:
-            with ctrl_c(failures):
+            with ctrl_c(signals):
                 self._load(library)
                 self.make()
-            if failures.interrupted:
+            if signals.interrupted:
                 raise KeyboardInterrupt
         except BaseException:
             self.close()
@@ -145,7 +145,7 @@ class Driver(ABC):
             return
         guid, file = self.file.description.guid, self.file.path.name
         other = _ALONE.get(guid)
-        if other is not None and other.failures is self.failures:
+        if other is not None and other.signals is self.signals:
             raise WiringError(
                 f"{self.name} and {other.name} are the same FMU, {file}, which can be instantiated only once "
                 "per process; run each in a process of its own, FMU(..., isolated=True)"
@@ -162,7 +162,7 @@ class Driver(ABC):
         identifier = self.interface.modelIdentifier
         try:
             if self.isolated:
-                self.process = Isolation(self.name, library, self.failures)
+                self.process = Isolation(self.name, library, self.signals)
                 # FMPy joins it to the folder of binaries: joined to an absolute path, the folder vanishes
                 identifier = str(support_library().with_suffix(""))
             # FMPy changes to the library's folder, a property of the process, and stays there if it fails
@@ -321,7 +321,7 @@ class Driver(ABC):
                     f"(the communication step is from {t:g} s to {end:g} s); look at its inputs and its log"
                 )
 
-    # ------------------------------------------------------------------------- failures
+    # ------------------------------------------------------------------------- signals
 
     @property
     def is_gone(self) -> bool:

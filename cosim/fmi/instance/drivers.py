@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...loop.signals import Failures
+from ...loop.signals import RunSignals
 from ..fmu_file import FMUFile
 from ..versions import FMI2
 from .driver import Driver
@@ -14,10 +14,10 @@ def load(
     file: FMUFile,
     name: str,
     model_exchange: bool,
-    failures: Failures,
+    signals: RunSignals,
     event_mode: bool = False,
     isolated: bool = False,
 ) -> Driver:
     """Load the library of an FMU and make an instance of it."""
     made = Driver2 if file.version is FMI2 else Driver3
-    return made(file, name, model_exchange, failures, event_mode, isolated)
+    return made(file, name, model_exchange, signals, event_mode, isolated)

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ...loop.operations import CALL, COPY, Op
-from ...loop.signals import Failures
+from ...loop.operations import Call, Copy, Operation
+from ...loop.signals import RunSignals
 from ...result import SimulationError
 from ..fmu_file import FMUFile
 from .instance import FMUInstance, VariableGroup
@@ -31,15 +31,14 @@ class EventInstance(FMUInstance):
         self,
         name: str,
         fmu: FMUFile,
-        failures: Failures,
+        signals: RunSignals,
         used: set[str],
         event_mode: bool = False,
         isolated: bool = False,
     ) -> None:
-        super().__init__(name, fmu, failures, used, event_mode, isolated)
+        super().__init__(name, fmu, signals, used, event_mode, isolated)
         #: (1,) time of the next time event, in s
         self.event_time = self.driver.event_time
-        self.input_callbacks: list[Any] = []
         self._output_clocks = [c.reference for c in fmu.clocks.values() if c.is_output]
 
     def arrays(self) -> list[Any]:
@@ -52,7 +51,7 @@ class EventInstance(FMUInstance):
 
     # ---------------------------------------------------------------------- operations
 
-    def latch(self) -> list[Op]:
+    def latch(self) -> list[Operation]:
         """Set the inputs; in event mode, those that can change at events only are set in an event."""
         waiting = [x for x in self.inputs if self.event_mode and x.discrete]
         native = [op for x in self.inputs if x not in waiting for op in self._set_inputs(x)]
@@ -61,19 +60,19 @@ class EventInstance(FMUInstance):
             return [*native, *self._latch_texts()]
         if not waiting and not self.fmu.clocks and not self.text_sources:
             return native
-        address = self._callback(self.input_callbacks, lambda t, h: self._send(t, waiting))
+        send = self.signals.callback(self.name, lambda t, h: self._send(t, waiting))
         what = "discrete inputs and clocks" if self.fmu.clocks else "discrete inputs"
-        sent = Op(f"{self.name}: {what} (Python callback)", CALL, address, participant=self.name)
+        sent = Call(text=f"{self.name}: {what} (Python callback)", function=send, participant=self.name)
         return [*native, *forget, *(op for x in waiting for op in self._from_floats(x)), sent]
 
-    def _get_outputs(self, x: VariableGroup, final: bool) -> list[Op]:
+    def _get_outputs(self, x: VariableGroup, final: bool) -> list[Operation]:
         if x.is_clock:
             return [self._scaled(x.last, x.values, 1.0)]
         return [] if x.clocks else super()._get_outputs(x, final)
 
-    def _scaled(self, source: Any, target: Any, factor: float) -> Op:
+    def _scaled(self, source: Any, target: Any, factor: float) -> Operation:
         a, b = int(source.ctypes.data), int(target.ctypes.data)
-        return Op("", COPY, a=a, b=b, n=len(source), weights=(factor, 0.0), participant=self.name)
+        return Copy(source=a, target=b, count=len(source), factor=factor, participant=self.name)
 
     # -------------------------------------------------------------------------- events
 
@@ -113,11 +112,11 @@ class EventInstance(FMUInstance):
 
     def end_run(self, t: float, at_end: bool) -> None:
         """Note that the FMU asks at t to end the run."""
-        self.failures.ask_to_end(self.name, t, at_end)
+        self.signals.ask_to_end(self.name, t, at_end)
 
     def is_interrupted(self) -> bool:
         """Return whether Ctrl-C was pressed."""
-        return self.failures.interrupted
+        return self.signals.interrupted
 
     def _start_events(self, t0: float) -> None:
         """Handle the events of the start."""

@@ -14,8 +14,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import CosimError, FMUError, SnapshotError
-from ...loop.operations import CALL, FROM_FLOAT, TO_FLOAT, Number, Op
-from ...loop.signals import Failures, ctrl_c
+from ...loop.conversions import FromFloat, ToFloat
+from ...loop.numbers import Number
+from ...loop.operations import Call, Operation
+from ...loop.signals import RunSignals, ctrl_c
 from ..fmu_file import FMUFile
 from ..ports import FMUPort
 from .driver import ERROR, OK
@@ -59,14 +61,14 @@ class FMUInstance:
         self,
         name: str,
         fmu: FMUFile,
-        failures: Failures,
+        signals: RunSignals,
         used: set[str],
         event_mode: bool = False,
         isolated: bool = False,
     ) -> None:
         self.name = name
         self.fmu = fmu
-        self.failures = failures
+        self.signals = signals
         #: whether it is initialized and not yet terminated
         self.running = False
         #: states of the FMU that were got and not freed
@@ -77,7 +79,7 @@ class FMUInstance:
         self.start_values = {n: v for n, v in given.items() if n not in structural | fmu.clocks.keys()}
         #: the intervals of clocks that were given
         self.intervals = {n: v for n, v in given.items() if n in fmu.clocks}
-        self.driver = load(fmu, name, self.model_exchange, failures, event_mode, isolated)
+        self.driver = load(fmu, name, self.model_exchange, signals, event_mode, isolated)
         self.api = self.driver.api
         try:
             self.driver.configure({n: given[n] for n in structural})
@@ -93,9 +95,7 @@ class FMUInstance:
         self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}
         self.sent_texts: dict[str, Any] = {}
         #: the instance and output from which an input of that kind comes
-        self.text_sources: dict[str, tuple[FMUInstance, str]] = {}
-        self.text_callbacks: list[Any] = []
-        self.has_outputs = bool(self.outputs)
+        self.text_sources: dict[str, tuple[Any, str]] = {}
 
     def _groups(self, ports: dict[str, FMUPort]) -> list[VariableGroup]:
         groups: dict[tuple[str, Number, bool, frozenset[int]], list[FMUPort]] = {}
@@ -135,7 +135,7 @@ class FMUInstance:
     def stop(self) -> str:
         """Terminate and free the instance; return how it crashed meanwhile if it is isolated and did."""
         before = self.driver.crash()
-        with ctrl_c(self.failures):
+        with ctrl_c(self.signals):
             self._end()
             after = self.driver.crash()
             self.driver.close()
@@ -171,6 +171,18 @@ class FMUInstance:
     def can_serialise(self) -> bool:
         """Whether the FMU can give its state as bytes."""
         return bool(self.can_save and self.driver.interface.canSerializeFMUstate)
+
+    @property
+    def unrepeatable(self) -> str:
+        """Why a step cannot be undone and repeated; "" if it can."""
+        if self.fmu.clocks:
+            return "clocks would tick at every repetition of a step"
+        if not self.can_save:
+            return (
+                "it cannot get and set its state (canGetAndSetFMUState), which the repetition of a step "
+                "needs; export it with that capability"
+            )
+        return ""
 
     def kind(self) -> tuple[Any, ...]:
         """Return the properties that another instance must share to restore a state of this one."""
@@ -227,64 +239,64 @@ class FMUInstance:
         component = self.api.component
         return int(component if isinstance(component, int) else component.value)
 
-    def _callback(self, kept: list[Any], function: Callable[[float, float], None]) -> int:
-        """Return the address of a callback of the loop, which is kept alive in a list."""
-        kept.append(self.failures.guard(self.name, function))
-        return ctypes.cast(kept[-1], ctypes.c_void_p).value or 0
-
     def address(self, port: str) -> int:
         """Return the address of the floats of a port."""
         return next(x.addresses[port] for x in [*self.inputs, *self.outputs] if port in x.addresses)
 
-    def read(self, fraction: float = 0.0, final: bool = True) -> list[Op]:
+    def read(self, fraction: float = 0.0, final: bool = True) -> list[Operation]:
         """Get the outputs that are used; they must be finite unless inputs are still to come."""
         return [op for x in self.outputs for op in self._get_outputs(x, final)]
 
-    def _get_outputs(self, x: VariableGroup, final: bool) -> list[Op]:
+    def _get_outputs(self, x: VariableGroup, final: bool) -> list[Operation]:
         is_float64 = x.raw is x.values
-        got = replace(self._values("Get", x, int(is_float64 and final)), text=f"{self.name}: outputs (FMU)")
-        return [got] if is_float64 else [got, self._convert(TO_FLOAT, x, x.raw, x.values)]
+        got = replace(self._values("Get", x, is_float64 and final), text=f"{self.name}: outputs (FMU)")
+        return [got] if is_float64 else [got, self._convert(ToFloat, x, x.raw, x.values)]
 
-    def _values(self, what: str, x: VariableGroup, check: int = 0) -> Op:
-        return Op(
-            "",
-            self.fmu.version.values,
-            self._function(f"{self.fmu.version.prefix}{what}{x.access}"),
-            self._component,
-            int(x.references.ctypes.data),
-            int(x.raw.ctypes.data),
-            check,
-            n=len(x.references),
+    def _values(self, what: str, x: VariableGroup, finite: bool = False) -> Operation:
+        return self.fmu.version.values(
+            function=self._function(f"{self.fmu.version.prefix}{what}{x.access}"),
+            component=self._component,
+            references=int(x.references.ctypes.data),
+            values=int(x.raw.ctypes.data),
+            n_references=len(x.references),
             count=len(x.elements),
+            finite=finite,
             participant=self.name,
         )
 
-    def _convert(self, code: int, x: VariableGroup, source: Any, target: Any) -> Op:
-        a, b, n = int(source.ctypes.data), int(target.ctypes.data), len(x.elements)
-        return Op("", code, a=a, b=b, n=n, number=x.number, participant=self.name)
+    def _convert(
+        self, kind: type[ToFloat | FromFloat], x: VariableGroup, source: Any, target: Any
+    ) -> Operation:
+        return kind(
+            source=int(source.ctypes.data),
+            target=int(target.ctypes.data),
+            count=len(x.elements),
+            number=x.number,
+            participant=self.name,
+        )
 
-    def latch(self) -> list[Op]:
+    def latch(self) -> list[Operation]:
         """Set the inputs."""
         numbers = [op for x in self.inputs for op in self._set_inputs(x)]
         return [*numbers, *self._latch_texts()]
 
-    def _set_inputs(self, x: VariableGroup) -> list[Op]:
+    def _set_inputs(self, x: VariableGroup) -> list[Operation]:
         return [*self._from_floats(x), self._values("Set", x)]
 
-    def _from_floats(self, x: VariableGroup) -> list[Op]:
-        return [] if x.raw is x.values else [self._convert(FROM_FLOAT, x, x.values, x.raw)]
+    def _from_floats(self, x: VariableGroup) -> list[Operation]:
+        return [] if x.raw is x.values else [self._convert(FromFloat, x, x.values, x.raw)]
 
     # --------------------------------------------------------- strings and binary data
 
-    def _text_op(self, what: str, function: Callable[[float, float], None]) -> Op:
-        address = self._callback(self.text_callbacks, function)
-        return Op(f"{self.name}: {what} (Python callback)", CALL, address, participant=self.name)
+    def _text_op(self, what: str, function: Callable[[float, float], None]) -> Operation:
+        callback = self.signals.callback(self.name, function)
+        return Call(text=f"{self.name}: {what} (Python callback)", function=callback, participant=self.name)
 
-    def read_texts(self) -> list[Op]:
+    def read_texts(self) -> list[Operation]:
         """Get the strings and binary data that are used."""
         return [self._text_op("text outputs", self._get_texts)] if self.texts else []
 
-    def _latch_texts(self) -> list[Op]:
+    def _latch_texts(self) -> list[Operation]:
         if not self.text_sources:
             return []
         return [self._text_op("text inputs", lambda t, h: self._set_texts(self._new_texts()))]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,8 +18,9 @@ import numpy as np
 from ...core.tableaus import TABLEAUS
 from ...core.variables import Array
 from ...errors import CosimError
-from ...loop.operations import CALL, COMBINE, COPY, END, FMI_TIME, FMI_VECTOR, SLACK, UNLESS_EVENT, Op
-from ...loop.signals import Failures
+from ...loop.fmi_operations import CompletedStep, End, SetTime, UnlessEvent, Vector
+from ...loop.operations import SLACK, Call, Combine, Copy, Operation
+from ...loop.signals import RunSignals
 from ..fmu_file import FMUFile
 from ..interfaces import DEFAULT_TOLERANCE, ModelExchange
 from .continuous_time import ContinuousTime
@@ -46,12 +46,12 @@ class ModelExchangeInstance(EventInstance):
         self,
         name: str,
         fmu: FMUFile,
-        failures: Failures,
+        signals: RunSignals,
         used: set[str],
         options: ModelExchange,
         isolated: bool,
     ) -> None:
-        super().__init__(name, fmu, failures, used, isolated=isolated)
+        super().__init__(name, fmu, signals, used, isolated=isolated)
         try:
             self.n_states, self.n_indicators = self.driver.counts()
         except CosimError:
@@ -63,7 +63,6 @@ class ModelExchangeInstance(EventInstance):
         self.signs = _floats(self.n_indicators) > 0.0
         self.stages = _floats(5 * self.n_states)
         self.event_address = 0
-        self.callbacks: list[Any] = []
         self.model = ContinuousTime(self.driver, self.n_states, self.n_indicators)
         self.options = options
         #: the solver of sampled coupling
@@ -83,26 +82,26 @@ class ModelExchangeInstance(EventInstance):
 
     # ---------------------------------------------------------------------- operations
 
-    def advance(self) -> list[Op]:
+    def advance(self) -> list[Operation]:
         """Integrate over the step, with the inputs held."""
         if self.solver == "cvode":
             text = f"{self.name}: cvode, tolerance {self.tolerance:g}, from event to event"
-            carry = self._callback(self.callbacks, self._carry_by_cvode)
-            return [Op(f"{text} (FMU, Python callback)", CALL, carry, participant=self.name)]
-        split = self._callback(self.callbacks, self._carry_by_fixed_steps)
+            carry = self.signals.callback(self.name, self._carry_by_cvode)
+            return [Call(text=f"{text} (FMU, Python callback)", function=carry, participant=self.name)]
+        split = self.signals.callback(self.name, self._carry_by_fixed_steps)
         event_time = int(self.event_time.ctypes.data)
         text = f"{self.name}: {self.solver}, {self.options.substeps} substeps, split at time events (FMU)"
-        unless = Op(text, UNLESS_EVENT, c=split, d=event_time, participant=self.name)
-        return [unless, *self._fixed_steps(), Op("", END, participant=self.name)]
+        unless = UnlessEvent(text=text, split=split, event_time=event_time, participant=self.name)
+        return [unless, *self._fixed_steps(), End(participant=self.name)]
 
-    def _fixed_steps(self) -> list[Op]:
+    def _fixed_steps(self) -> list[Operation]:
         """Integrate by Runge-Kutta over the model's derivatives."""
         nodes, rows, weights = TABLEAUS[self.solver]
         part = 1.0 / self.options.substeps
         base = self.stages.ctypes.data
-        ops: list[Op] = []
+        ops: list[Operation] = []
         for j in range(self.options.substeps):
-            ops.append(Op("", COPY, a=self.state_address, b=base, n=self.n_states, weights=(1.0, 0.0)))
+            ops.append(Copy(source=self.state_address, target=base, count=self.n_states))
             for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
                 c = (j + node) * part
                 if i > 0:
@@ -113,43 +112,58 @@ class ModelExchangeInstance(EventInstance):
             ops.append(self._combine(base, [part * w for w in weights]))
         return [*ops, *self.set_states(1.0), *self.complete()]
 
-    def _combine(self, base: int, weights: list[float]) -> Op:
-        slopes = base + 8 * self.n_states
-        return Op(
-            "", COMBINE, a=base, b=slopes, c=self.state_address, n=self.n_states, weights=tuple(weights)
+    def _combine(self, base: int, weights: list[float]) -> Operation:
+        return Combine(
+            start=base,
+            slopes=base + 8 * self.n_states,
+            result=self.state_address,
+            count=self.n_states,
+            weights=tuple(weights),
+            participant=self.name,
         )
 
-    def _vector(self, name: str, address: int) -> Op:
-        n = self.n_states
-        return Op("", FMI_VECTOR, self._function(name), self._component, address, n=n, participant=self.name)
+    def _vector(self, name: str, address: int) -> Operation:
+        return Vector(
+            function=self._function(name),
+            component=self._component,
+            values=address,
+            count=self.n_states,
+            participant=self.name,
+        )
 
-    def set_states(self, fraction: float) -> list[Op]:
+    def set_states(self, fraction: float) -> list[Operation]:
         """Set time and states."""
-        time = self._function(f"{self.fmu.version.prefix}SetTime")
-        ops = [Op("", FMI_TIME, time, self._component, fraction=fraction, participant=self.name)]
-        states = f"{self.fmu.version.prefix}SetContinuousStates"
-        return [*ops, self._vector(states, self.state_address)] if self.n_states else ops
+        prefix = self.fmu.version.prefix
+        time = SetTime(
+            function=self._function(f"{prefix}SetTime"),
+            component=self._component,
+            fraction=fraction,
+            participant=self.name,
+        )
+        states = f"{prefix}SetContinuousStates"
+        return [time, self._vector(states, self.state_address)] if self.n_states else [time]
 
-    def derivatives(self, target: int, fraction: float) -> list[Op]:
+    def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Get the derivatives into `target`."""
         return [self._vector(self.fmu.version.get_derivatives, target)] if self.n_states else []
 
-    def complete(self) -> list[Op]:
+    def complete(self) -> list[Operation]:
         """Report a completed step to the model; handle its events."""
+        self.event_address = self.event_address or self.signals.callback(self.name, self._handle_events)
         # always, even if the model states that it need not be told: FMPy reads that flag inverted
-        function = self._function(f"{self.fmu.version.prefix}CompletedIntegratorStep")
-        flags, event_time = int(self.flags.ctypes.data), int(self.event_time.ctypes.data)
-        code, handler = self.fmu.version.completed, self._events_address()
-        report = Op("", code, function, self._component, flags, handler, event_time)
-        ops = [replace(report, fraction=1.0, participant=self.name)]
-        if self.n_indicators:
-            text = f"{self.name}: events (Python callback)"
-            ops.append(Op(text, CALL, handler, fraction=1.0, participant=self.name))
-        return ops
-
-    def _events_address(self) -> int:
-        self.event_address = self.event_address or self._callback(self.callbacks, self._handle_events)
-        return self.event_address
+        completed = CompletedStep(
+            function=self._function(f"{self.fmu.version.prefix}CompletedIntegratorStep"),
+            component=self._component,
+            flags=int(self.flags.ctypes.data),
+            event_time=int(self.event_time.ctypes.data),
+            events=self.event_address,
+            boolean=f"i{8 * self.flags.itemsize}",
+            fraction=1.0,
+            participant=self.name,
+        )
+        text = f"{self.name}: events (Python callback)"
+        call = Call(text=text, function=self.event_address, fraction=1.0, participant=self.name)
+        return [completed, call] if self.n_indicators else [completed]
 
     # ------------------------------------------------------------------ steps in Python
 

@@ -1,1 +1,1 @@
-"""One file a coupling algorithm."""
+"""One file a coupling: each puts the operations of the instances of a system in order."""

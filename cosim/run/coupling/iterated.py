@@ -1,6 +1,6 @@
 """Iterated coupling: FMUs and Continuous participants that drive each other, without delay.
 
-Under sampled coupling each of two coupled plants holds what the other one gave at t_k, an
+Under sampled coupling each of two coupled plants holds the other one's value at t_k, an
 error of first order in h that can destabilise. Here the values w that they exchange are
 solved for at t_{k+1}: each step is taken with their mean held,
 
@@ -8,141 +8,152 @@ solved for at t_{k+1}: each step is taken with their mean held,
 
 undone and repeated until w_{k+1} agrees with itself (quasi_newton.py). So the interface
 conditions hold at every communication point, direct feedthrough in a ring included, and
-the coupling is of second order. What blocks give is held over the step, as always.
+the coupling is of second order. The outputs of blocks are held over the step, as under
+sampled coupling, whose schedule at t_k is used.
 """
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Callable
 
 import numpy as np
 
 from ...core.port import Port
 from ...core.variables import Array
 from ...errors import WiringError
-from ...fmi.instance.co_simulation import CoSimulationInstance
-from ...fmi.instance.model_exchange import ModelExchangeInstance
 from ...loop.loop import Loop
-from ...loop.operations import CALL, Op
-from ...loop.signals import EndOfRun, Failures
+from ...loop.operations import Call, Copy, Operation
+from ...loop.signals import EndOfRun
 from ...result import SimulationError
 from ...system.system import Connection
-from ..kernel_instance import KernelInstance
+from ..binding import Binding
+from ..instance import buffer
 from .quasi_newton import NoConvergence, QuasiNewton
+from .sampled import at_point
+from .schedule import Schedule
 
-Coupled: TypeAlias = KernelInstance | CoSimulationInstance | ModelExchangeInstance
+
+def iterated(binding: Binding) -> Schedule:
+    """Return the schedule of iterated coupling."""
+    moving, connections = set(binding.moving), binding.system.connections
+    coupled = [
+        c for c in connections if {c.source.participant, c.target.participant} <= moving and c.initial is None
+    ]
+    if not coupled:
+        raise WiringError(
+            "iterated coupling has nothing to iterate: no FMU or Continuous is connected to another one; "
+            'use coupling="sampled"'
+        )
+    iteration = Iteration(binding, coupled)
+    alone = [name for name in binding.moving if name not in iteration.members]
+    to_next: list[Operation] = []
+    for name in binding.moving:
+        to_next += binding.copies(name, without=coupled)
+        to_next += binding.instances[name].latch() if name in alone else []
+    to_next += [op for name in alone for op in binding.instances[name].advance()]
+    to_next += [iteration.operation(), *binding.pass_on]
+    return Schedule(
+        "iterated coupling", at_point(binding), to_next, memory=iteration.memory, start=iteration.start
+    )
 
 
-class IteratedCoupling:
-    """The participants that drive each other, and the solver of what they exchange."""
+class Iteration:
+    """Moves the participants that drive each other, and solves for the values that they exchange."""
 
-    def __init__(
-        self,
-        members: Mapping[str, Coupled],
-        connections: list[Connection],
-        tolerance: float,
-        address: Callable[[Port], int],
-        run_once: Callable[[Loop, float, int], None],
-        failures: Failures,
-    ) -> None:
-        """Take the members by name, the connections between them, and the program's services.
-
-        address
-            returns where the floats of a port lie
-        run_once
-            runs the operations of a loop at t_0 + k h; raises what ends the run
-        """
-        self._instances = members
+    def __init__(self, binding: Binding, coupled: list[Connection]) -> None:
+        self._binding = binding
+        ends = {end.participant for c in coupled for end in (c.source, c.target)}
         #: the participants, in the order of the system
-        self.members = list(members)
-        self._run_once = run_once
-        self._failures = failures
-        unable = [name for name, instance in self._instances.items() if not instance.can_save]
-        if unable:
-            raise WiringError(
-                f"{', '.join(unable)} cannot get and set its state (canGetAndSetFMUState), which iterated "
-                'coupling needs to repeat a step; use coupling="sampled", or export it with that capability'
-            )
-        self._sources = list(dict.fromkeys(c.source for c in connections))
-        self._views = [_floats(address(p), p.count) for p in self._sources]
-        n = 0
-        where = {}
+        self.members = {name: i for name, i in binding.instances.items() if name in ends}
+        reasons = {name: i.unrepeatable for name, i in self.members.items() if i.unrepeatable}
+        for reason in reasons.values():
+            names = ", ".join(name for name, its in reasons.items() if its == reason)
+            raise WiringError(f'{names} cannot be iterated: {reason}; use coupling="sampled"')
+        self._sources = list(dict.fromkeys(c.source for c in coupled))
+        n = sum(port.count for port in self._sources)
+        #: the values that are given to the inputs, and those that come back
+        self._held, self._outputs = buffer(n), buffer(n)
+        held, outputs = int(self._held.ctypes.data), int(self._outputs.ctypes.data)
+        places: dict[Port, int] = {}
         for port in self._sources:
-            where[port] = slice(n, n + port.count)
-            n += port.count
-        self._inputs = [
-            (_floats(address(c.target), c.target.count), where[c.source], c.scale, c.offset)
-            for c in connections
+            places[port] = sum(8 * p.count for p in places)
+        #: the operations that give the one and collect the other
+        self._give = [binding.copy_from(c, held + places[c.source]) for c in coupled]
+        self._collect = [
+            Copy(source=binding.address(p), target=outputs + place, count=p.count)
+            for p, place in places.items()
         ]
-        self._solver = QuasiNewton(n, tolerance)
-        #: what is exchanged at t_k and at t_{k-1}
+        self._solver = QuasiNewton(n, binding.plan.tolerance)
+        #: the exchanged values at t_k and at t_{k-1}
         self._w, self._before = np.full((2, n), np.nan)
-        self._t0 = 0.0
+        self.memory: list[Array] = [self._w, self._before, *self._solver.arrays()]
         self._loops: tuple[Loop, Loop] | None = None
-        self._callback = failures.guard(self.members[0], self._step)
+        self._callback = binding.signals.callback(next(iter(self.members)), self._step)
 
-    def operation(self) -> Op:
+    def operation(self) -> Operation:
         """Return the operation that moves the members from t_k to t_{k+1}."""
-        address = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
         text = (
             f"{', '.join(self.members)}: step, repeated until {', '.join(map(str, self._sources))} "
             f"agree at t_k+1 to {self._solver.tolerance:g} (Python callback)"
         )
-        return Op(text, CALL, address, participant=self.members[0])
+        return Call(text=text, function=self._callback, participant=next(iter(self.members)))
 
-    def arrays(self) -> list[Array]:
-        """Return the memory that belongs to the state of a simulation."""
-        return [self._w, self._before, *self._solver.arrays()]
-
-    def start(self, t0: float) -> None:
-        """Let the outputs at t_0 agree with the inputs that they are."""
-        self._t0 = t0
-        every = list(self._instances.values())
-        latch = [op for i in every for op in i.latch()]
-        stop = self._failures.stop
-        look = Loop([*latch, *(op for i in every for op in i.read(0.0))], [], stop)
-        after = [op for i in every for op in i.read(1.0)]
-        move = Loop([*latch, *(op for i in every for op in i.advance())], [], stop)
-        self._loops = move, Loop([*latch, *after], [], stop)
+    def start(self) -> None:
+        """Make the outputs at t_0 agree with the inputs that follow from them."""
+        instances = list(self.members.values())
+        latch = [op for i in instances for op in i.latch()]
+        move = [op for i in instances for op in i.advance()]
+        before, after = ([op for i in instances for op in i.read(c)] for c in (0.0, 1.0))
+        look = self._loop([*latch, *before, *self._collect])
+        again = self._loop([*self._give, *latch, *before, *self._collect])
+        self._loops = (
+            self._loop([*self._give, *latch, *move]),
+            self._loop([*self._give, *latch, *after, *self._collect]),
+        )
 
         def g(w: Array) -> Array:
-            self._hold(w)
-            self._run_once(look, t0, 0)
-            return self._outputs()
+            return self._exchange(again, 0, w)
 
         solver = QuasiNewton(len(self._w), self._solver.tolerance)
         try:
-            self._run_once(look, t0, 0)
-            self._w[:] = self._before[:] = self._solved(solver, g, self._outputs(), t0)
+            self._binding.run_once(look, 0)
+            self._w[:] = self._before[:] = self._solved(
+                solver, g, self._outputs.copy(), self._binding.plan.start
+            )
         except EndOfRun as end:
             raise SimulationError(f"{end.text}, which is its start") from None
+
+    def _loop(self, ops: list[Operation]) -> Loop:
+        return Loop(ops, [], [], self._binding.signals.stop)
+
+    def _exchange(self, loop: Loop, k: int, w: Array) -> Array:
+        """Give values to the inputs, run a loop, and return the values that come back."""
+        self._held[:] = w
+        self._binding.run_once(loop, k)
+        return self._outputs.copy()
 
     def _step(self, t: float, h: float) -> None:
         """Take the step from t; the outputs are left as they are at t + h."""
         assert self._loops is not None
         move, look = self._loops
-        k = round((t - self._t0) / h)
-        saved = {name: instance.save(serialised=False) for name, instance in self._instances.items()}
-        moved, asked = False, self._failures.end
+        k = round((t - self._binding.plan.start) / h)
+        saved = {name: instance.save(serialised=False) for name, instance in self.members.items()}
+        moved, signals = False, self._binding.signals
+        asked = signals.end
 
         def g(w: Array) -> Array:
             nonlocal moved
             if moved:
-                for name, instance in self._instances.items():
+                for name, instance in self.members.items():
                     instance.restore(saved[name])
-                self._failures.set_end(asked)
+                signals.set_end(asked)
             moved = True
-            self._hold(0.5 * (self._w + w))
-            self._run_once(move, self._t0, k)
-            self._hold(w)
-            self._run_once(look, self._t0, k)
-            return self._outputs()
+            self._exchange(move, k, 0.5 * (self._w + w))
+            return self._exchange(look, k, w)
 
         w = self._solved(self._solver, g, 2.0 * self._w - self._before, t + h)
         self._before[:], self._w[:] = self._w, w
-        for name, instance in self._instances.items():
+        for name, instance in self.members.items():
             instance.forget(saved[name])
 
     def _solved(self, solver: QuasiNewton, g: Callable[[Array], Array], guess: Array, t: float) -> Array:
@@ -156,16 +167,3 @@ class IteratedCoupling:
                 f"by {error.residual[worst]:.3g} of its size, tolerance {solver.tolerance:g}; "
                 "take a smaller step=, or a larger tolerance="
             ) from None
-
-    def _hold(self, w: Array) -> None:
-        for view, part, scale, offset in self._inputs:
-            view[:] = scale * w[part] + offset
-
-    def _outputs(self) -> Array:
-        return np.concatenate(self._views)
-
-
-def _floats(address: int, n: int) -> Array:
-    """Return n floats at an address as an array."""
-    array: Array = np.ctypeslib.as_array((ctypes.c_double * n).from_address(address))
-    return array

@@ -3,8 +3,11 @@
     r(w) = g(w) - w,   J dw = -r,   J <- J + (r_new) dw^T / (dw^T dw)
 
 g is a communication step that is repeated with other coupling values, so evaluations are
-dear and n is small: J is built by differences once, and again only where the kept one has
-become bad. C. G. Broyden, Math. Comp. 19 (1965) 577-593.
+expensive and n is small: J is built by differences once, and again only where the kept one
+no longer leads to convergence.
+
+C. G. Broyden, A class of methods for solving nonlinear simultaneous equations,
+Math. Comp. 19 (1965) 577-593, doi:10.1090/S0025-5718-1965-0198670-6.
 """
 
 from __future__ import annotations
@@ -15,13 +18,13 @@ import numpy as np
 
 from ...core.variables import Array
 
-_REBUILD = 6  # evaluations with a kept Jacobian before it is built anew
-_LIMIT = 30  # evaluations in all, without those that build the Jacobian
-_DIFFERENCE = 1e-6  # of the scale of a value; of 1 where nothing is known of it
+_REBUILD = 6  # evaluations with a kept Jacobian before it is built again
+_LIMIT = 30  # evaluations, not counting those that build the Jacobian
+_DIFFERENCE = 1e-6  # of the scale of a value, or of 1 as long as it has none
 
 
 class NoConvergence(Exception):
-    """The residual did not come below the tolerance; `residual` is relative, by value."""
+    """The residual did not fall below the tolerance; `residual` is relative, one per value."""
 
     def __init__(self, residual: Array) -> None:
         super().__init__(f"relative residual {np.max(residual):.3g}")
@@ -29,19 +32,19 @@ class NoConvergence(Exception):
 
 
 class QuasiNewton:
-    """Solves w = g(w) for n values, again and again for a g that changes little.
+    """Solves w = g(w) for n values, repeatedly for a g that changes little.
 
     tolerance
-        |g(w) - w| of every value over the largest magnitude that it has or had as a solution
+        |g(w) - w| of every value, over its largest magnitude, now and in the solutions so far
     """
 
     def __init__(self, n: int, tolerance: float) -> None:
         self.tolerance = tolerance
-        #: dr/dw; not a number where it is not known yet
+        #: dr/dw; NaN before it is built
         self.jacobian: Array = np.full((n, n), np.nan)
         #: the largest magnitude of every value in the solutions so far
         self.scale: Array = np.zeros(n)
-        #: evaluations so far: what solving costs
+        #: evaluations so far: the cost of solving
         self.evaluations = np.zeros(1)
 
     def arrays(self) -> list[Array]:
@@ -49,7 +52,7 @@ class QuasiNewton:
         return [self.jacobian, self.scale, self.evaluations]
 
     def solve(self, g: Callable[[Array], Array], guess: Array) -> Array:
-        """Return w with w = g(w), from a guess; the last evaluation of g is at it. Raises NoConvergence."""
+        """Return w with w = g(w), from a guess; g is evaluated there last. Raises NoConvergence."""
         w = guess.copy()
         r = self._residual(g, w)
         built = False
@@ -64,9 +67,9 @@ class QuasiNewton:
             dw = self._direction(r)
             w = w + dw
             r_new = self._residual(g, w)
-            if (np.abs(dw) <= 4e-16 * np.abs(w)).all():  # as near as numbers come
+            if (np.abs(dw) <= 4e-16 * np.abs(w)).all():  # as close as float64 can resolve
                 break
-            # r + J dw = 0 as far as J is right
+            # r + J dw = 0 if J is exact, so r_new is the error of J dw
             self.jacobian += np.outer(r_new, dw) / (dw @ dw)
             r = r_new
         else:

@@ -177,9 +177,9 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
     longer = SCENARIO.replace("stop: float = 2.0", "stop: float = 4.0e5")
     path.write_text(longer.replace("step=0.01", "step=1e-3"))
     code = (  # SIGINT is ignored where tests run in the background
-        "import os, signal, sys, threading, cosim.cli.app, cosim.run.simulation\n"
+        "import os, signal, sys, threading, cosim.cli.app, cosim.run.recorder\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "cosim.run.simulation.MEMORY_LIMIT = 0\n"
+        "cosim.run.recorder.MEMORY_LIMIT = 0\n"
         "threading.Timer(6.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         f"cosim.cli.app.main(['run', {str(path)!r}, '--out', {str(tmp_path / 'out')!r}])\n"
     )

@@ -206,3 +206,30 @@ def test_the_code_needs_libm_at_most():
     # sin, exp and atan2 are the C library's in both; a vector form may differ in the last digit
     assert run["c.y"] == pytest.approx(by_python["c.y"], rel=1e-14)
     assert np.ptp(run["c.y"]) > 0.1
+
+
+IR = """
+declare double @"{symbol}"(double)
+define i32 @"kernel_outputs"(ptr %self, double %t, double %h) {{
+  %y = call double @"{symbol}"(double %t)
+  ret i32 0
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("symbol", "remedy"),
+    [
+        ("NRT_Allocate", "declared Local"),
+        ("PyErr_Format", "Python runtime"),
+        ("mystery", "only functions of libm"),
+    ],
+)
+def test_a_symbol_that_compiled_code_does_not_have_is_named_with_its_remedy(symbol, remedy):
+    import llvmlite.binding as llvm
+
+    module = llvm.parse_assembly(IR.format(symbol=symbol))
+    with pytest.raises(CompilationError, match=f"kernel_outputs needs '{symbol}'.*{remedy}"):
+        compiler.check_symbols(module, "kernel_outputs")
+    for known in ("hypot", "llvm.sqrt.f64"):
+        compiler.check_symbols(llvm.parse_assembly(IR.format(symbol=known)), "kernel_outputs")

@@ -27,8 +27,6 @@ from cosim import (
     simulate,
 )
 from cosim.cli.inspection import inspection
-from cosim.loop.loop import _Writer
-from cosim.loop.operations import TO_FLOAT, Op
 from fmus.export import export
 from tests.cosim.fmi.probe import INTEGERS, probe
 from tests.cosim.fmi.test_fmu import Chain, closed
@@ -121,14 +119,6 @@ def test_negative_integers_beside_booleans(probes, first, recorded):
     for p in participants:
         assert list(result[f"{p}.i_out"]) == [-6.0] * 3
         assert list(result[f"{p}.b_out"]) == [0.0] * 3
-
-
-def test_two_functions_of_one_name_are_an_internal_error():
-    """The last text under a name would serve all of its callers."""
-    writer = _Writer()
-    writer.convert(("f", "text"), Op("", TO_FLOAT))
-    with pytest.raises(AssertionError, match="two functions of the loop are named f"):
-        writer.convert(("f", "another text"), Op("", TO_FLOAT))
 
 
 @pytest.mark.parametrize("version", VERSIONS)

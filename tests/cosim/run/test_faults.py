@@ -137,6 +137,23 @@ def test_a_failing_initialize_is_an_error_with_its_cause(jit):
     assert simulate(System({"block": BadStart(K=1.0)}), step=0.1, stop=1.0, jit=jit).steps == 10
 
 
+class BadSecondStart(BadStart):
+    """Fails at its first start; on the storage that this start has left it would not fail."""
+
+    starts = State(0.0)
+
+    def initialize(self):
+        self.starts = self.starts + 1.0
+        if self.starts == 1.0:
+            raise ValueError("first start")
+
+
+@pytest.mark.parametrize("jit", [True, False])
+def test_a_failing_initialize_is_explained_from_the_storage_that_it_began_with(jit):
+    with pytest.raises(SimulationError, match="block failed at t = 0 s: ValueError: first start"):
+        simulate(System({"block": BadSecondStart()}), step=0.1, stop=1.0, jit=jit)
+
+
 class Initialized(Block):
     """Working memory from parameters, made once."""
 

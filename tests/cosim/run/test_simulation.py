@@ -274,7 +274,7 @@ def test_a_snapshot_of_another_simulation_is_refused(paths):
     for options in ({"jit": False}, {"coupling": "continuous"}):
         with standing(Mass(), **options) as simulation, pytest.raises(SnapshotError, match="another simul"):
             simulation.restore(mass)
-    with standing(Mass()) as simulation, pytest.raises(SnapshotError, match="None is no snapshot"):
+    with standing(Mass()) as simulation, pytest.raises(SnapshotError, match="None must be a snapshot"):
         simulation.restore(None)
 
 

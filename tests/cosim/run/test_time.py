@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim import Block, DeclarationError, Input, Output, State, System, TimeError, simulate
+from cosim.core.time_grid import steps_between
 from tests.cosim.parts import Counter, Gain, Integrator, Mass, Ramp, Through
 
 
@@ -137,16 +138,16 @@ class Chain(Block):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"step": 0.0}, "step=0 s; a communication step is above zero"),
+        ({"step": 0.0}, "step=0 s; a communication step must be above zero"),
         ({"step": -0.1}, "above zero"),
-        ({"step": math.nan}, "no finite number"),
-        ({"step": "0.1"}, "no finite number"),
+        ({"step": math.nan}, "must be a finite number"),
+        ({"step": "0.1"}, "must be a finite number"),
         ({"step": 0.03}, "the time from start to stop of 1 s is 33.3333 communication steps"),
         ({"step": 0.1 + 1e-8}, "must be a whole number of them"),
         ({"step": 1e-320}, "more than can be counted"),
         ({"stop": 0.0}, "is not after start"),
-        ({"stop": math.inf}, "no finite number"),
-        ({"stop": None}, "stop=None is no finite number"),
+        ({"stop": math.inf}, "must be a finite number"),
+        ({"stop": None}, "stop=None must be a finite number"),
         ({"decimation": 0}, "decimation=0"),
         ({"decimation": 2.5}, "decimation=2.5"),
         ({"coupling": "sample"}, "did you mean 'sampled'"),
@@ -154,8 +155,8 @@ class Chain(Block):
         ({"coupling": None}, "coupling 'None' is not known"),
         ({"solver": ["ode3"]}, "is not known; did you mean 'ode3'"),
         ({"record": "ramp.u"}, "give a list of ports"),
-        ({"record": [1]}, "is no list of ports"),
-        ({"statistics": 5}, "5 is no list of ports"),
+        ({"record": [1]}, "must be a list of ports"),
+        ({"statistics": 5}, "5 must be a list of ports"),
     ],
 )
 def test_what_does_not_fit_the_grid_is_refused(options, words):
@@ -176,6 +177,33 @@ def test_a_sample_period_that_is_no_multiple_is_refused_never_rounded(period):
 def test_wrong_rates_are_refused_where_they_are_given(options):
     with pytest.raises(DeclarationError, match="Ramp"):
         Ramp(**options)
+
+
+@pytest.mark.parametrize(
+    ("period", "h", "proposed"),
+    [
+        (1.0, 0.03, "0.025"),  # 34 steps would be 0.0294118 s, which does not divide 1 s
+        (0.15, 0.1, "0.075"),
+        (12.0, 0.7, "0.6"),
+        (0.3000001, 0.1, "0.3000001/4"),  # no step of six digits fits
+        (math.pi, 0.01, "3.141592653589793/315"),
+        (0.05, 0.1, "0.05"),
+        (1.0, 0.1 + 1e-8, "0.1"),
+    ],
+)
+def test_the_step_that_an_error_proposes_is_accepted(period, h, proposed):
+    with pytest.raises(TimeError, match=f"choose a step such as {proposed} s$") as caught:
+        steps_between(period, h, "the time")
+    assert "is 3 communication" not in str(caught.value)  # 3.000001 must not look whole
+    numerator, _, denominator = proposed.partition("/")
+    assert steps_between(period, float(numerator) / float(denominator or 1), "the time") >= 1
+
+
+def test_a_count_of_steps_beyond_the_precision_of_the_ratio_passes():
+    """1e8 / 0.001 is off by one unit in its last place, 1.5e-5 of a step."""
+    assert steps_between(1e8, 0.001, "the time") == 10**11
+    with pytest.raises(TimeError, match=r"100000000000\.5 communication steps"):
+        steps_between(1e8 + 0.0005, 0.001, "the time")
 
 
 def test_decimal_steps_pass():

@@ -85,9 +85,9 @@ def test_wrong_connections_say_where_what_and_the_remedy(source, target, words):
 
 
 def test_what_is_no_system_is_refused():
-    with pytest.raises(WiringError, match=r"'plant\.fmu' is no System"):
+    with pytest.raises(WiringError, match=r"'plant\.fmu' must be a System"):
         simulate("plant.fmu", step=0.1, stop=1.0)
-    with pytest.raises(WiringError, match="is no System"):
+    with pytest.raises(WiringError, match="must be a System"):
         schedule(None, step=0.1)
     with pytest.raises(WiringError, match="must be a dictionary of participants"):
         System([Mass()])

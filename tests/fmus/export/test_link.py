@@ -22,7 +22,7 @@ from cosim.codegen.c_compiler import fmi_headers
 from cosim.codegen.kernels import cache_directory
 from fmus.export import ExportError, export
 from fmus.export.fmu import FMI_VERSIONS
-from fmus.export.link import build_model, check_symbols
+from fmus.export.link import build_model
 from fmus.plants.oscillator import Oscillator
 from tests.fmus.export.host import ERROR, OK, Accumulator, Host
 
@@ -108,42 +108,6 @@ def test_no_path_of_this_machine_is_inside(tmp_path: Path) -> None:
     (library,) = binaries(export(Oscillator(), tmp_path / "o.fmu")).values()
     for path in (Path(fmus.export.link.__file__).parent, Path.home(), cache_directory()):
         assert str(path).encode() not in library
-
-
-IR = """
-declare double @sin(double)
-declare double @llvm.fabs.f64(double)
-declare ptr @{symbol}(i64)
-define void @helper() {{
-  %p = call ptr @{symbol}(i64 8)
-  ret void
-}}
-define i32 @kernel_outputs(ptr %r, double %t, double %h) {{
-  call void @helper()
-  ret i32 0
-}}
-define i32 @kernel_derivatives(ptr %r, double %t, double %h) {{
-  %s = call double @sin(double %t)
-  ret i32 0
-}}
-"""
-
-
-@pytest.mark.parametrize(
-    ("symbol", "remedy"),
-    [
-        ("NRT_Allocate", "declared Local"),
-        ("PyErr_Format", "Python runtime"),
-        ("mystery", "only functions of libm"),
-    ],
-)
-def test_a_symbol_that_is_not_there_is_named_with_its_kernel(symbol: str, remedy: str) -> None:
-    with pytest.raises(ExportError, match=f"Plant: kernel outputs needs '{symbol}'.*{remedy}"):
-        check_symbols(IR.format(symbol=symbol), "Plant")
-
-
-def test_libm_and_intrinsics_are_there() -> None:
-    check_symbols(IR.format(symbol="hypot"), "Plant")
 
 
 def test_a_missing_compiler_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ import pytest
 from cosim import FMU, FMUError, SimulationError
 from cosim.fmi.instance.continuous_time import ContinuousTime
 from cosim.fmi.instance.drivers import load
-from cosim.loop.signals import Failures
+from cosim.loop.signals import RunSignals
 from tests.cosim.fmi.isolation.test_isolation import crash
 from tests.cosim.fmi.probe import probe
 
@@ -17,7 +17,7 @@ from tests.cosim.fmi.probe import probe
 @pytest.fixture
 def driver(tmp_path):
     """A driver of the FMU of c/probe2.c."""
-    made = load(FMU(probe(tmp_path / "probe.fmu", "2.0")), "p", False, Failures())
+    made = load(FMU(probe(tmp_path / "probe.fmu", "2.0")), "p", False, RunSignals())
     yield made
     made.free()
     made.close()
@@ -46,7 +46,7 @@ def test_a_negative_status_is_a_failure(driver):
 
 
 def test_a_negative_status_of_an_isolated_fmu_is_an_error(tmp_path):
-    p = load(crash(tmp_path, "none negative 0"), "p", False, Failures(), isolated=True)
+    p = load(crash(tmp_path, "none negative 0"), "p", False, RunSignals(), isolated=True)
     with pytest.raises(FMUError, match=r"failed to set u = 2\.0: fmi2SetReal failed with status 3"):
         p.set(p.file.variables["u"], [2.0])
     p.free()

@@ -18,7 +18,7 @@ import pytest
 from cosim import FMU, Block, FMUError, Output, Simulation, SimulationError, SnapshotError, System, simulate
 from cosim.fmi.instance.drivers import load
 from cosim.fmi.isolation.isolation import compile_support
-from cosim.loop.signals import Failures
+from cosim.loop.signals import RunSignals
 from fmus.export import export
 from tests.cosim.fmi.ball import ball
 from tests.cosim.fmi.metronome import metronome
@@ -179,7 +179,7 @@ def test_several_instances_of_what_a_process_can_have_once_only(tmp_path):
 @contextmanager
 def instance(fmu):
     """An isolated instance by itself, to call its functions one by one."""
-    driver = load(fmu, "p", False, Failures(), isolated=True)
+    driver = load(fmu, "p", False, RunSignals(), isolated=True)
     try:
         yield driver
         driver.free()
@@ -252,10 +252,10 @@ ODD_CALLS = """
     from cosim import FMU
     from cosim.fmi.instance.drivers import load
     from cosim.fmi.isolation.isolation import _LOOK, _support
-    from cosim.loop.signals import Failures
+    from cosim.loop.signals import RunSignals
 
     fmu = FMU(sys.argv[1], isolated=True)
-    driver = load(fmu, "p", False, Failures(), isolated=True)
+    driver = load(fmu, "p", False, RunSignals(), isolated=True)
     dll, c, vr = driver.api.dll, driver.api.component, (ctypes.c_uint32 * 1)(0)
     kinds = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
     dll.loop_fmi2SetReal.argtypes = dll.loop_fmi2GetReal.argtypes = dll.fmi2SetString.argtypes = kinds

@@ -10,13 +10,13 @@ from cosim import (
     CoSimulation,
     Input,
     LinearContinuous,
+    OptionError,
     Output,
     Parameter,
     Simulation,
     SimulationError,
     State,
     System,
-    TimeError,
     WiringError,
     schedule,
     simulate,
@@ -174,14 +174,14 @@ def test_the_schedule_says_what_is_repeated():
 
 
 def test_what_cannot_be_iterated_is_refused(tmp_path):
-    with pytest.raises(WiringError, match="nothing is there to iterate"):
+    with pytest.raises(WiringError, match="has nothing to iterate"):
         simulate(
             System({"m": Mass(), "g": Gain()}, [("m.x", "g.x")]), step=0.1, stop=1.0, coupling="iterated"
         )
     system = System({"theirs": FMU(probe(tmp_path / "p.fmu", "2.0")), "m": Mass()}, [("m.x", "theirs.r_in")])
-    with pytest.raises(WiringError, match="theirs cannot get and set its state"):
+    with pytest.raises(WiringError, match="theirs cannot be iterated: it cannot get and set its state"):
         simulate(system, step=0.1, stop=1.0, coupling="iterated")
-    with pytest.raises(TimeError, match="tolerance=0 is no relative tolerance"):
+    with pytest.raises(OptionError, match="tolerance=0 must be a number between 0 and 1"):
         simulate(pair(), step=0.1, stop=1.0, coupling="iterated", tolerance=0)
 
 
