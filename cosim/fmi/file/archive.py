@@ -70,7 +70,7 @@ class Archive:
                 self._zip = zipfile.ZipFile(self._file)
             except Exception as error:  # zipfile raises exceptions of many types for a broken archive
                 raise FMUError(
-                    f"{path} is no {kind}: it is not a ZIP archive ({str(error)[:99]}); was it copied "
+                    f"{path} is not an {kind}: it is not a ZIP archive ({str(error)[:99]}); was it copied "
                     "completely?"
                 ) from error
             self._entries = self._checked()
@@ -104,7 +104,7 @@ class Archive:
             where = (
                 f"; it is in {places[0]}: pack the contents of that folder, not the folder" if places else ""
             )
-            raise FMUError(f"{self.path} is no {self.kind}: it has no {name} at its top{where}")
+            raise FMUError(f"{self.path} is not an {self.kind}: it has no {name} at its top{where}")
         entry = self._entries[name]
         if entry.file_size > MAX_XML:
             raise FMUError(f"{self.path}: {name} of {_size(entry.file_size)} is too large")
@@ -165,7 +165,7 @@ class Archive:
         at = len(tail) - 22 if plain else tail.rfind(b"PK\x05\x06")
         if at < 0 or len(tail) < at + 22:
             raise FMUError(
-                f"{self.path} is no {self.kind}: it is not a ZIP archive (it has no end); "
+                f"{self.path} is not an {self.kind}: it is not a ZIP archive (it has no end); "
                 "was it copied completely?"
             )
         (size,) = struct.unpack_from("<I", tail, at + 12)
@@ -202,8 +202,8 @@ class Archive:
         packed = max(self._file.seek(0, os.SEEK_END), 1)
         if total > MAX_UNPACKED or (total > HARMLESS and total > MAX_RATIO * packed):
             raise FMUError(
-                f"{self.path} of {_size(packed)} unpacks to {_size(total)}, which is a ZIP bomb "
-                f"and no {self.kind}"
+                f"{self.path} of {_size(packed)} unpacks to {_size(total)}, which is a ZIP bomb, "
+                f"not an {self.kind}"
             )
         return files
 

@@ -1,4 +1,4 @@
-"""FMI 2.0 and 3.0 through one class: what one version gives, the other gives, and what only 3.0 has.
+"""FMI 2.0 and 3.0 through one class: the same results from both versions, and the features of 3.0.
 
 The FMUs are exported by us where we can, and c/probe.h where the exporter has no such thing.
 """
@@ -167,7 +167,7 @@ def test_a_request_to_end_within_a_step(probes, version, tmp_path):
 
 
 def test_after_a_request_to_end(probes):
-    """Nothing runs on, but what was saved before can be returned to."""
+    """The run cannot continue, but an earlier snapshot can be restored."""
     with Simulation(System({"r": Ramp(), "p": FMU(probes["2.0"], start={"end_at": 3 * H})}), step=H) as run:
         with pytest.warns(SimulationEndedWarning):
             run.run(5 * H)
@@ -176,7 +176,7 @@ def test_after_a_request_to_end(probes):
 
 
 def test_an_early_return_is_continued(probes):
-    """x moves by what every doStep covers; FMI 2.0 can only discard a step, which ends the run."""
+    """x moves by the time that every doStep covers; FMI 2.0 can only discard a step, which ends the run."""
     system = System({"p": FMU(probes["3.0"], start={"early_at": 4.5 * H})})
     assert list(simulate(system, step=H, stop=9 * H)["p.x"]) == [k * H % 1.0 for k in range(10)]
     system = System({"p": FMU(probes["2.0"], start={"early_at": 4.5 * H})})

@@ -82,7 +82,7 @@ def test_model_exchange_alone_is_integrated_in_substeps(tmp_path):
 
 
 def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
-    """u[2] is not connected: it has the value that it was given, at every step."""
+    """u[2] is not connected: it keeps its start value at every step."""
     plant = Chain(k=5.0, u=[0.0, 1.5])
     fmu = FMU(fmu_path, start={"k": 5.0, "u": [0.0, 1.5]})
     runs = [simulate(closed(p), step=0.01, stop=1.0, record=["plant.a"]) for p in (plant, fmu)]

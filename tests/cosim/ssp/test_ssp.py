@@ -341,11 +341,11 @@ def test_files_that_are_no_ssp(package, tmp_path):
     with pytest.raises(CosimError, match=r"there is no file .*none\.ssp"):
         read_ssp(tmp_path / "none.ssp")
     (tmp_path / "text.ssp").write_text("text")
-    with pytest.raises(CosimError, match="is no SSP: it is not a ZIP archive"):
+    with pytest.raises(CosimError, match="is not an SSP: it is not a ZIP archive"):
         read_ssp(tmp_path / "text.ssp")
     with zipfile.ZipFile(tmp_path / "empty.ssp", "w") as archive:
         archive.writestr("a.txt", "")
-    with pytest.raises(CosimError, match=r"is no SSP: it has no SystemStructure\.ssd at its top"):
+    with pytest.raises(CosimError, match=r"is not an SSP: it has no SystemStructure\.ssd at its top"):
         read_ssp(tmp_path / "empty.ssp")
     with pytest.raises(CosimError, match=r"has SSP version 3\.0; 1\.0 and 2\.0 are supported"):
         read_ssp(package(system(TWO), version="3.0", valid=False))

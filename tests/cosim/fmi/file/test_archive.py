@@ -156,7 +156,7 @@ def declare(path: Path, name: str, size: int) -> None:
 
 
 def test_a_bomb_by_ratio(tmp_path, tmp, monkeypatch):
-    """32 MB of zeros in 33 kB: refused by what its directory declares; below HARMLESS it is unpacked."""
+    """32 MB of zeros in 33 kB: refused by its declared size; below HARMLESS it is unpacked."""
     more = [("resources/zeros", bytes(2**25))]
     path = write(tmp_path / "bomb.fmu", more=more, compression=zipfile.ZIP_DEFLATED)
     assert FMU(path)

@@ -40,7 +40,7 @@ VARIABLES = [
 
 
 def fmu_with_units(path, version):
-    """Value references are those of probe.h that keep what is set."""
+    """Value references of probe.h that keep their values."""
     rows = ""
     for i, (name, attributes, causality) in enumerate(VARIABLES):
         general = f'name="{name}" valueReference="{46 + i}" causality="{causality}" '
@@ -121,7 +121,7 @@ def test_texts_that_are_refused(path, start, words):
 @settings(max_examples=200, deadline=None)
 @given(st.floats(-1e12, 1e12), st.sampled_from(["deg", " deg ", "rad", "\tmrad"]))
 def test_any_number_is_read(number, unit):
-    """repr of a float is read back, with any unit after it, and nothing that is no float is."""
+    """repr of a float is read back, with any unit after it; other texts are refused."""
     units = [
         SimpleNamespace(name="rad", baseUnit=None, displayUnits=[DisplayUnit("deg", factor=180.0 / math.pi)])
     ]

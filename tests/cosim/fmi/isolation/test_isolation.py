@@ -1,4 +1,4 @@
-"""FMUs in processes of their own: the same bits, and crashes that end the run and nothing else."""
+"""FMUs in processes of their own: the same bits, and crashes that end only the run."""
 
 from __future__ import annotations
 
