@@ -109,10 +109,12 @@ class FMI3DoStep(_FMIFunction):
 
 @dataclass(frozen=True, kw_only=True)
 class SetTime(_FMIFunction):
-    """Set the time."""
+    """Set the time; inside a Repeat of `substeps` the fraction is one of a substep."""
+
+    substeps: int = 1
 
     def emit(self, w: Writer) -> None:
-        w.check_fmi(w.call("ptr double", w.address("component"), w.time(self.fraction)))
+        w.check_fmi(w.call("ptr double", w.address("component"), w.time(self.fraction, self.substeps)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,22 +165,49 @@ class UnlessEvent(Operation):
     split: Address
 
     def emit(self, w: Writer) -> None:
-        end = w.value(f"fsub double {w.time(1.0)}, {w.multiply('%h', number(SLACK))}")
-        due = w.value(f"fcmp olt double {w.load(w.address('event_time'))}, {end}")
+        before_end = w.value(f"fsub double {w.time(1.0)}, {w.multiply('%h', number(SLACK))}")
+        due = w.value(f"fcmp olt double {w.load(w.address('event_time'))}, {before_end}")
         inside, split, on = w.label(), w.label(), w.label()
         w.branch(due, split, inside)
         w.start_block(split)
         w.call_back("split", w.time(0.0), "%h")
         w.go_to(on)
         w.start_block(inside)
-        w.ends.append(on)
+
+        def close() -> None:
+            w.go_to(on)
+            w.start_block(on)
+
+        w.ends.append(close)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repeat(Operation):
+    """Run the operations up to End `count` times, once a substep."""
+
+    count: int
+
+    def emit(self, w: Writer) -> None:
+        before, loop, again, on = w.block, w.label(), w.label(), w.label()
+        j, following = f"%{loop}j", f"%{again}j"
+        w.go_to(loop)
+        w.start_block(loop)
+        w.write(f"{j} = phi i64 [ 0, %{before} ], [ {following}, %{again} ]")
+        w.substep = w.value(f"sitofp i64 {j} to double")
+
+        def close() -> None:
+            w.go_to(again)
+            w.start_block(again)
+            w.write(f"{following} = add i64 {j}, 1")
+            w.branch(w.value(f"icmp slt i64 {following}, {self.count}"), loop, on)
+            w.start_block(on)
+
+        w.ends.append(close)
 
 
 @dataclass(frozen=True, kw_only=True)
 class End(Operation):
-    """Close the last UnlessEvent."""
+    """Close the last UnlessEvent or Repeat."""
 
     def emit(self, w: Writer) -> None:
-        on = w.ends.pop()
-        w.go_to(on)
-        w.start_block(on)
+        w.ends.pop()()

@@ -27,8 +27,10 @@ class Writer:
         self.library: dict[str, str] = {}
         #: the block that is being written
         self.block = ""
-        #: blocks at which the operations after an UnlessEvent and its End go on
-        self.ends: list[str] = []
+        #: writes the End of every UnlessEvent and Repeat that is open
+        self.ends: list[Callable[[], None]] = []
+        #: the number of the substep, a double, inside a Repeat
+        self.substep = ""
         #: the current operation: its number, and the places of its addresses in the table
         self.row = 0
         self.places: dict[str, int] = {}
@@ -136,10 +138,12 @@ class Writer:
         """Return x y."""
         return self.value(f"fmul double {x}, {y}")
 
-    def time(self, fraction: float) -> str:
-        """Return t_0 + (k + fraction) h."""
-        k = "%kf" if fraction == 0.0 else self.add("%kf", number(fraction))
-        return self.add("%t0", self.multiply(k, "%h"))
+    def time(self, fraction: float, substeps: int = 1) -> str:
+        """Return t_0 + (k + c) h: c is the fraction of a step, or that of the present one of its substeps."""
+        c = "" if fraction == 0.0 else number(fraction)
+        if substeps > 1:
+            c = self.multiply(self.add(self.substep, number(fraction)), number(1.0 / substeps))
+        return self.add("%t0", self.multiply(self.add("%kf", c) if c else "%kf", "%h"))
 
     def step(self, every: int) -> str:
         """Return the step of an operation that runs at every n-th communication point."""

@@ -18,7 +18,7 @@ import numpy as np
 from ...core.tableaus import TABLEAUS
 from ...core.variables import Array
 from ...errors import CosimError
-from ...loop.fmi_operations import CompletedStep, End, SetTime, UnlessEvent, Vector
+from ...loop.fmi_operations import CompletedStep, End, Repeat, SetTime, UnlessEvent, Vector
 from ...loop.operations import SLACK, Call, Combine, Copy, Operation
 from ...loop.signals import RunSignals
 from ..fmu_file import FMUFile
@@ -97,19 +97,16 @@ class ModelExchangeInstance(EventInstance):
     def _fixed_steps(self) -> list[Operation]:
         """Integrate by Runge-Kutta over the model's derivatives."""
         nodes, rows, weights = TABLEAUS[self.solver]
-        part = 1.0 / self.options.substeps
-        base = self.stages.ctypes.data
-        ops: list[Operation] = []
-        for j in range(self.options.substeps):
-            ops.append(Copy(source=self.state_address, target=base, count=self.n_states))
-            for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
-                c = (j + node) * part
-                if i > 0:
-                    ops += [self._combine(base, [part * w for w in row]), *self.set_states(c)]
-                else:
-                    ops += self.set_states(c)
-                ops += self.derivatives(base + 8 * self.n_states * (1 + i), c)
-            ops.append(self._combine(base, [part * w for w in weights]))
+        n, base = self.options.substeps, int(self.stages.ctypes.data)
+        part = 1.0 / n
+        ops: list[Operation] = [Copy(source=self.state_address, target=base, count=self.n_states)]
+        for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
+            if i > 0:
+                ops.append(self._combine(base, [part * w for w in row]))
+            ops += [*self.set_states(node, n), *self.derivatives(base + 8 * self.n_states * (1 + i), node)]
+        ops.append(self._combine(base, [part * w for w in weights]))
+        if n > 1:
+            ops = [Repeat(count=n), *ops, End()]
         return [*ops, *self.set_states(1.0), *self.complete()]
 
     def _combine(self, base: int, weights: list[float]) -> Operation:
@@ -131,13 +128,14 @@ class ModelExchangeInstance(EventInstance):
             participant=self.name,
         )
 
-    def set_states(self, fraction: float) -> list[Operation]:
+    def set_states(self, fraction: float, substeps: int = 1) -> list[Operation]:
         """Set time and states."""
         prefix = self.fmu.version.prefix
         time = SetTime(
             function=self._function(f"{prefix}SetTime"),
             component=self._component,
             fraction=fraction,
+            substeps=substeps,
             participant=self.name,
         )
         states = f"{prefix}SetContinuousStates"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from cosim.loop import conversions, fmi_operations, operations
 from cosim.loop.conversions import FromFloat, ToFloat
-from cosim.loop.loop import Loop
+from cosim.loop.loop import Loop, loop_ir
 from cosim.loop.numbers import NUMBERS
 from cosim.loop.operations import INLINE, Call, Combine, Copy, Gather, Operation, Record, Sample
 from cosim.loop.signals import KERNEL
@@ -314,6 +315,27 @@ def test_unless_event_leaves_out_what_stands_before_its_end():
     event_time[0] = 1.0 + H  # at the end of the step: not inside it
     run(*ops)
     assert target[0] == 1.0
+
+
+def test_repeat_runs_its_substeps_at_their_own_times():
+    """Bit for bit the times (k + (j + c) / n) h of a loop that is written out."""
+    time, x = Fake(P, D), np.ones(1)
+    ops = [
+        fmi_operations.Repeat(count=3),
+        fmi_operations.SetTime(function=time.address, component=COMPONENT, fraction=0.5, substeps=3),
+        Copy(source=at(x), target=at(x), count=1, factor=2.0),
+        fmi_operations.End(),
+        fmi_operations.SetTime(function=time.address, component=COMPONENT, fraction=1.0),
+    ]
+    run(*ops, points=2, first=4)
+    wanted = [1.0 + (k + (j + 0.5) * (1.0 / 3)) * H for k in (4, 5) for j in range(3)]
+    assert [t for _, t in time.calls] == [*wanted[:3], 1.0 + 5.0 * H, *wanted[3:], 1.0 + 6.0 * H]
+    assert x[0] == 64.0
+    time.status = 3
+    assert run(*ops, first=4) == (True, [1, 4, 3])
+    assert loop_ir(ops, [], []).count("\n") == loop_ir([replace(ops[0], count=9999), *ops[1:]], [], []).count(
+        "\n"
+    )
 
 
 def test_every_operation_is_tested_here():
