@@ -26,6 +26,7 @@ from .errors import (
     did_you_mean,
 )
 from .fmi.fmu import FMU
+from .fmi.interfaces import CoSimulation, ModelExchange
 from .ground_motion import GroundMotion, el_centro, read_at2, read_columns
 from .ground_motion.ground_motion import G
 from .result import Interrupted, Result, SimulationError, Statistics
@@ -41,6 +42,7 @@ __all__ = [
     "FMU",
     "Array",
     "Block",
+    "CoSimulation",
     "CompilationError",
     "CompiledKernelsWarning",
     "Component",
@@ -57,6 +59,7 @@ __all__ = [
     "LateEventWarning",
     "LinearContinuous",
     "Local",
+    "ModelExchange",
     "OptionError",
     "Output",
     "Parameter",

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 
-from cosim import FMU, Block, Input, SimulationError, System, simulate
+from cosim import FMU, Block, Input, ModelExchange, SimulationError, System, simulate
 from cosim.blocks import function_source
 from cosim.cli.app import main
 from fmus.export import export
@@ -81,7 +81,7 @@ def test_model_exchange_of_both_versions(tmp_path: Path, options: dict[str, obje
     runs = []
     for version in ("2.0", "3.0"):
         path = export(Oscillator(c=0.3, k=4.0), tmp_path / f"{version}.fmu", fmi_version=version)
-        plant = FMU(path, interface="ModelExchange", **options)  # type: ignore[arg-type]
+        plant = FMU(path, interface=ModelExchange(**options))  # type: ignore[arg-type]
         system = System({"plant": plant, "u": function_source(np.sin)}, [("u.y", "plant.u")])
         runs.append(simulate(system, step=0.01, stop=5.0, record=["plant.x", "plant.v", "plant.a"]))
     exact = System({"plant": Oscillator(c=0.3, k=4.0), "u": function_source(np.sin)}, [("u.y", "plant.u")])

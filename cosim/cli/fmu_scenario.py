@@ -14,7 +14,8 @@ import numpy as np
 
 from ..errors import FMUError, TimeError, did_you_mean
 from ..fmi.file.display_units import has_unit
-from ..fmi.fmu import FMU, Interface, Solver
+from ..fmi.fmu import FMU
+from ..fmi.interfaces import InterfaceName, Solver, interface_of
 from ..result import Result
 from ..run.simulation import simulate
 from ..system.system import System
@@ -36,12 +37,12 @@ class FMUStudy:
     """communication step, s [the FMU's default]"""
     start_time: float | None = None
     """time at which the run starts, s [the FMU's default, or 0]"""
-    interface: Interface | None = None
+    interface: InterfaceName | None = None
     """CoSimulation or ModelExchange, for an FMU that offers both [CoSimulation]"""
     solver: Solver | None = None
     """solver of Model Exchange: ode1 to ode4, cvode [ode4; cvode for an FMU with event indicators]"""
-    substeps: int = 1
-    """steps of ode1 to ode4 in a communication step"""
+    substeps: int | None = None
+    """steps of ode1 to ode4 in a communication step [1]"""
     tolerance: float | None = None
     """relative tolerance of cvode [1e-6]"""
     event_mode: bool | None = None
@@ -68,11 +69,14 @@ class FMUStudy:
         fmu = FMU(
             self.path,
             start=values,
-            interface=self.interface,
-            solver=self.solver,
-            substeps=self.substeps,
-            tolerance=self.tolerance,
-            event_mode=self.event_mode,
+            interface=interface_of(
+                self.path.name,
+                self.interface,
+                solver=self.solver,
+                substeps=self.substeps,
+                tolerance=self.tolerance,
+                event_mode=self.event_mode,
+            ),
             isolated=self.isolated,
         )
         system = System({self.name: fmu})

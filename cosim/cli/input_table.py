@@ -57,6 +57,7 @@ def start_from_inputs(system: System, name: str, t: float) -> None:
     """Start the inputs that a file supplies with their values at t, unless start values are given."""
     fmu = system.participants[name]
     assert isinstance(fmu, FMU)
+    values: dict[str, float | list[float]] = {}
     for c in system.connections:
         source = system.participants[c.source.participant]
         variable = f"{c.target.name}{c.target.index}"
@@ -64,7 +65,8 @@ def start_from_inputs(system: System, name: str, t: float) -> None:
             first = source.fresh()
             assert isinstance(first, TableSource)
             first.step(t, 0.0)
-            fmu.start.setdefault(variable, first.y.tolist() if c.target.count > 1 else float(first.y[0]))
+            values[variable] = first.y.tolist() if c.target.count > 1 else float(first.y[0])
+    system.participants[name] = fmu.with_start({**values, **fmu.start})
 
 
 def _read(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -93,7 +95,7 @@ def _read(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 def _check_input(path: Path, fmu: FMU, name: str) -> None:
     variable = fmu.variables.get(name)
-    if variable is not None and variable.causality == "input" and variable.type not in fmu.adapter.NUMBERS:
+    if variable is not None and variable.causality == "input" and variable.type not in fmu.version.numbers:
         raise RecordError(
             f"{path}: {name} is a {variable.type}, and inputs over time must be numbers; "
             "leave out the column and give a start value"

@@ -1,11 +1,12 @@
-"""What an FMU really does: `cosim doctor plant.fmu`.
+"""Examination of an FMU's behaviour: `cosim doctor plant.fmu`.
 
     report = examine("plant.fmu")
     print(report.text())
 
-Its description is validated, then it is probed: does reset repeat a run, does a state come
-back, do instances leak or disturb each other, are the declared dependencies those that are
-seen. Every probe (probes.py) runs in a process of its own (child.py), which may crash or hang.
+The description is validated. Then probes (probes.py) check whether reset repeats a run, whether a
+state can be restored, whether instances leak or disturb each other, and whether the declared
+dependencies are those observed. Every probe runs in a process of its own (child.py), which may
+crash or hang.
 """
 
 from .examination import examine

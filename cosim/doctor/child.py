@@ -1,7 +1,7 @@
-"""One probe in a process of its own: python -m cosim.doctor.child FMU PROBE INTERFACE ANSWER
+"""One probe in a process of its own: python -P -m cosim.doctor.child FMU PROBE INTERFACE ANSWER
 
-ANSWER is a file of lines of JSON: what is being done, one line each time, and at the end
-the verdict. What the FMU prints is of no interest.
+ANSWER is a file of lines of JSON: one line before each action, and the verdict as the last line.
+The output that the FMU prints is not read.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .examination import PROBES
 
 
 def main(path: str, probe: str, interface: str, answer: str) -> None:
-    """Run a probe, and write what it does and finds."""
+    """Run a probe, and write its actions and its verdict."""
     with open(answer, "w", encoding="utf-8") as out:
 
         def write(**line: str) -> None:

@@ -27,7 +27,7 @@ _FILE = ("",)
 
 @dataclass(frozen=True)
 class Planned:
-    """A probe, and the interfaces that it is for."""
+    """A probe, and the interfaces to which it applies."""
 
     name: str
     function: probes.Probe
@@ -54,7 +54,7 @@ PROBES = (
 def examine(
     path: str | PathLike[str], *, only: Iterable[str] | None = None, time_limit: float = TIME_LIMIT
 ) -> Report:
-    """Examine an FMU; whatever it does is a finding, none is raised.
+    """Examine an FMU; every fault is reported as a finding, none is raised.
 
     only
         the names of the probes to run; all by default
@@ -65,7 +65,7 @@ def examine(
     wanted = [p.name for p in PROBES] if only is None else list(only)
     for name in wanted:
         if name not in [p.name for p in PROBES]:
-            raise CosimError(f"there is no probe '{name}'" + did_you_mean(name, [p.name for p in PROBES]))
+            raise CosimError(f"probe '{name}' does not exist" + did_you_mean(name, [p.name for p in PROBES]))
     try:
         fmu = FMU(path)
         with Archive(path) as archive:
@@ -98,12 +98,13 @@ def _probed(path: Path, probe: str, interface: str, folder: Path, time_limit: fl
     folder.mkdir()
     answer, words = folder / "answer", folder / "words"
     package = str(Path(__file__).parents[2])
-    # what a process that dies has unpacked goes with the folder
+    # a process that dies leaves its unpacked FMU in the folder, which is removed
     environment = os.environ | {
         "TMPDIR": str(folder),
         "PYTHONPATH": os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")])),
     }
-    command = [sys.executable, "-m", "cosim.doctor.child", str(path), probe, interface, str(answer)]
+    # without -P, Python would import a json.py of the current folder in place of its own
+    command = [sys.executable, "-P", "-m", "cosim.doctor.child", str(path), probe, interface, str(answer)]
     with words.open("wb") as out:
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, env=environment, start_new_session=True
@@ -134,7 +135,7 @@ def _complete_lines(path: Path) -> list[str]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the process, and what it started, if it is still there."""
+    """End the process and its children if it is still running."""
     if process.poll() is None:
         if os.name == "posix":
             os.killpg(process.pid, signal.SIGKILL)  # a process group of its own: start_new_session

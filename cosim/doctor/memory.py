@@ -1,4 +1,4 @@
-"""What the process uses, where the system tells."""
+"""Memory and handles of the process, where the system reports them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def memory() -> int:
-    """Return the bytes of memory in use (Linux), or the most that were (macOS); 0 on Windows."""
+    """Return the bytes of memory in use (Linux), or their peak (macOS); 0 on Windows."""
     statm = Path("/proc/self/statm")
     if statm.exists():
         return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -1,4 +1,4 @@
-"""Calls that an importer must not make: an error status is the right answer, silence a bad sign."""
+"""Calls that an importer must not make: an FMU should answer them with an error status."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _answered(what: str, call: Callable[[], Any], doing: Doing) -> Verdict:
     except Exception as error:  # FMPy raises FMICallException and bare Exception alike
         status = str(error).splitlines()[0][:80]
         return "ok", f"refused ({status})"
-    return "warning", f"taken without a word: {what}"
+    return "warning", f"accepted without an error: {what}"
 
 
 def step_before_initialization(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
@@ -42,7 +42,7 @@ def negative_step(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def unknown_reference(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Get a variable that is not there."""
+    """Get a variable that does not exist."""
     subject = Subject(fmu, model_exchange)
     subject.start()
     known = {v.valueReference for v in fmu.variables.values()}

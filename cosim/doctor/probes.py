@@ -1,8 +1,8 @@
-"""The probes: each tries one thing on an FMU, and says what it saw.
+"""The probes: each examines one property of an FMU, and reports its finding.
 
-A probe is given the FMU, whether it is Model Exchange, and `doing`, which it tells what it
-is about to do: that is what is left to read when the FMU takes the process with it. It
-returns a level (report.LEVELS) and a text. The probes of misuse are in misuse.py.
+A probe takes the FMU, whether to use Model Exchange, and `doing`, which it calls with a text before
+every action, so that the last action is known if the FMU ends the process. It returns a level
+(report.LEVELS) and a text. The probes of misuse are in misuse.py.
 """
 
 from __future__ import annotations
@@ -12,27 +12,29 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from ..errors import CosimError, WiringError
 from ..fmi.fmu import FMU
 from ..fmi.ports import FMUPort, unit_of
+from ..units import parse
 from .memory import handles, memory
-from .subject import STEPS, CosimError, Subject, Values, difference, same
+from .subject import STEPS, Subject, Values, difference, same
 
 Verdict: TypeAlias = tuple[str, str]
 Doing: TypeAlias = Callable[[str], None]
 Probe: TypeAlias = Callable[[FMU, bool, Doing], Verdict]
 
 INSTANCES = 1000
-#: bytes of growth an instance: below, it is the noise of the process; above LARGE a campaign dies of it
+#: bytes of growth per instance: below SMALL it is noise; above LARGE a campaign runs out of memory
 SMALL, LARGE = 1024, 102_400
-#: of the range of an output: what two step sizes differ by
+#: difference between two step sizes, as a part of the range of an output
 ROUNDING, COARSE = 1e-6, 0.1
-#: of the values of an output: where two terms in an input cancel, rounding is left
+#: rounding that is left where two terms in an input cancel, as a part of the values of an output
 CANCELLED = 1e-10
-_NAMED = 4  # ports that a line names
+_NAMED = 4  # number of ports that a line names
 
 
 def named(names: list[str]) -> str:
-    """Return names for a line."""
+    """Return the first of some names as a text."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more
 
@@ -53,10 +55,7 @@ def validity(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Inputs and outputs that are real numbers have units, and ones that can be converted."""
-    from ..errors import WiringError
-    from ..units import parse
-
+    """Inputs and outputs that are real numbers have units that can be converted."""
     doing("read the units")
     kinds = {n: p for n, p in {**fmu.input_ports, **fmu.output_ports}.items() if _is_real(fmu, p)}
     ends = {n: p for n, p in kinds.items() if p.variables[0].causality in ("input", "output")}
@@ -76,7 +75,7 @@ def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def _is_real(fmu: FMU, port: FMUPort) -> bool:
-    return fmu.adapter.NUMBERS[port.type][1].is_float
+    return fmu.version.numbers[port.type][1].is_float
 
 
 # ------------------------------------------------------------------------- its instances
@@ -117,7 +116,7 @@ def initial_values(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
         if model.n_states:
             model.get_derivatives(slopes.ctypes.data)
         model.get_indicators(indicators.ctypes.data)
-        values |= {"derivatives": slopes, "event indicators": indicators, "states": subject.states}
+        values |= {"derivatives": slopes, "event indicators": indicators, "states": subject.states()}
         text += f", {model.n_states} derivatives and {model.n_indicators} event indicators"
     bad = [n for n, v in values.items() if not np.isfinite(v.astype(float)).all()]
     subject.stop()
@@ -125,7 +124,7 @@ def initial_values(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """After reset a run is the same, bit for bit; if not, is it in a new instance?"""
+    """After reset a run is the same, bit for bit; if it is not, a new instance is compared as well."""
     subject = Subject(fmu, model_exchange)
     doing("initialize")
     subject.start()
@@ -158,7 +157,7 @@ def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """A state that was got and is set, also by way of bytes and in another instance, repeats the run."""
+    """A saved state repeats the run when it is set; also from bytes and in another instance."""
     interface = _interface(fmu, model_exchange)
     if not interface.canGetAndSetFMUstate:
         return "note", "not declared: it cannot be saved and returned to"
@@ -180,7 +179,7 @@ def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
         subject.stop()
         return "ok", f"repeats {STEPS} steps bit for bit; not as bytes (not declared)"
     doing("serialise the state")
-    data = subject.fmi.attempt("serialise its state", lambda: subject.api.serializeFMUState(saved[0]))
+    data = subject.driver.attempt("serialise its state", lambda: subject.api.serializeFMUState(saved[0]))
     doing("free the state")
     subject.forget(saved)
     if not interface.canBeInstantiatedOnlyOncePerProcess:
@@ -188,7 +187,7 @@ def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
         subject = Subject(fmu, model_exchange, "another")
         subject.start()
     doing("deserialise the state")
-    read = subject.fmi.attempt("read its state", lambda: subject.api.deserializeFMUState(data)), saved[1]
+    read = subject.driver.attempt("read its state", lambda: subject.api.deserializeFMUState(data)), saved[1]
     doing("set the deserialised state")
     subject.restore(read)
     third = [subject.read(), *subject.run(STEPS, half)]
@@ -200,7 +199,7 @@ def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def leak(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Many instances after each other in one process: memory and handles do not grow."""
+    """Memory and handles do not grow over many instances in one process, one after the other."""
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return ONCE
     warm = INSTANCES // 5
@@ -227,7 +226,7 @@ def leak(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def several(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """The run of an instance is the same when another one runs, with other inputs, in turn."""
+    """The run of an instance is the same while another one runs in turn with other inputs."""
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return ONCE
     doing("run one instance")
@@ -259,7 +258,7 @@ def several(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def feedthrough(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Every input is changed without a step: outputs that change at once are those declared."""
+    """Every input is changed without a step: the outputs that change at once are declared."""
     subject = Subject(fmu, model_exchange)
     if not subject.inputs:
         return "ok", "no continuous inputs"
@@ -284,7 +283,7 @@ def feedthrough(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def _changed(before: Values, after: Values) -> list[str]:
-    """Return the ports that changed, by more than rounding beside their own values and other changes."""
+    """Return the ports whose change exceeds the rounding of their own values and of other changes."""
     values = {
         n: (v.astype(float), after[n].astype(float)) for n, v in before.items() if not same(v, after[n])
     }
@@ -295,9 +294,9 @@ def _changed(before: Values, after: Values) -> list[str]:
 
 
 def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict:
-    """Compare what was seen with what the model structure declares."""
+    """Compare the observed dependencies with those that the model structure declares."""
     declared = fmu.feedthrough()
-    numeric = [u for u in fmu.description.outputs if u.variable.type in subject.fmi.NUMBERS]
+    numeric = [u for u in fmu.description.outputs if u.variable.type in fmu.version.numbers]
     listed = {fmu.key(u.variable) for u in numeric if u.dependencies is not None}  # aliases share it
     open_ends = [n for n, p in subject.outputs.items() if not {fmu.key(v) for v in p.variables} <= listed]
     hidden = [f"{o} on {i}" for o, inputs in seen.items() for i in sorted(inputs - declared[o])]
@@ -317,7 +316,7 @@ def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict
 
 
 def step_size(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """The same run with h and with h / 2, inputs held; compared at the points that both have."""
+    """Compare runs with h and with h / 2, with held inputs, at the points that both have."""
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return ONCE
     runs: list[list[Values]] = []

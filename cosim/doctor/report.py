@@ -1,4 +1,4 @@
-"""What the probes found, as text and as data."""
+"""The findings of the probes, as text and as data."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
-#: levels, from good to bad, and the exit code of a report whose worst finding it is
+#: levels from good to bad, and the exit code of a report with this worst finding
 LEVELS: Mapping[str, int] = {"ok": 0, "note": 0, "warning": 1, "error": 2, "crashed": 3}
 
 
@@ -18,10 +18,10 @@ def worst(levels: list[str]) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """What one probe found: a line of the report."""
+    """The finding of one probe: a line of the report."""
 
     probe: str
-    #: "Co-Simulation", "Model Exchange", or "" of what concerns the file
+    #: "Co-Simulation", "Model Exchange", or "" for a property of the file
     interface: str
     level: str
     text: str
@@ -47,7 +47,7 @@ class Report:
         return LEVELS[self.worst]
 
     def summary(self) -> str:
-        """Return how many findings there are of each level, the worst first."""
+        """Return the number of findings of each level, the worst first."""
         counts = Counter(f.level for f in self.findings)
         plural = {"note": "notes", "warning": "warnings", "error": "errors"}
         parts = [
@@ -59,7 +59,7 @@ class Report:
         return f"{number}: {', '.join(parts)}"
 
     def text(self) -> str:
-        """Return the report, a line a probe."""
+        """Return the report, one line per probe."""
         lines, interface = [f"{self.fmu}: {self.about}", ""], ""
         width = max(len(f.probe) for f in self.findings)
         for f in self.findings:

@@ -1,7 +1,7 @@
-"""Ports of an FMU: what its variables are to a system.
+"""Ports of an FMU, made from its variables.
 
 An array variable of FMI 3.0 is a port. Scalar variables that are the elements of one
-array (`accel[1]`, `accel[2]`, ...; all there is in FMI 2.0) are joined to one.
+array (`accel[1]`, `accel[2]`, ..., as FMI 2.0 has them) are joined to one port.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..units import BASE_UNITS, Definition
 
 Shape: TypeAlias = tuple[int, ...]
 
-#: values of one port: 80 MB of floats, exchanged at every step
+#: values of all ports of an FMU: 80 MB of floats, exchanged at every step
 MAX_ELEMENTS = 10_000_000
 
 
@@ -39,7 +39,7 @@ class FMUPort:
 
     @property
     def relative(self) -> bool:
-        """Tell whether it is a difference, whose unit has no offset."""
+        """Return whether it is a difference, whose unit has no offset."""
         v = self.variables[0]
         own = v.relativeQuantity
         return bool(own if own is not None or v.declaredType is None else v.declaredType.relativeQuantity)
@@ -108,6 +108,20 @@ def display_unit_of(variable: Any) -> str | None:
     return str(unit) if unit else None
 
 
+def shape_of(variable: Any, start: Mapping[str, Any]) -> Shape:
+    """Return the shape of a variable: fixed dimensions, or those of structural parameters."""
+    sizes = []
+    for d in variable.dimensions:
+        size = d.start if d.start is not None else start.get(d.variable.name, d.variable.start)
+        try:
+            sizes.append(int(size))
+        except (TypeError, ValueError):
+            raise FMUError(
+                f"{variable.name}: its dimension {d.variable.name} = {size!r} must be a whole number"
+            ) from None
+    return tuple(sizes)
+
+
 def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[str, FMUPort]:
     """Return the ports of variables by name."""
     groups: dict[tuple[str, int], list[tuple[Shape, Any]]] = {}
@@ -120,6 +134,11 @@ def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[st
             groups.setdefault((match[1], len(index)), []).append((index, v))
         else:
             found[v.name] = single(v, shape)
+    if (total := sum(port.size for port in found.values())) > MAX_ELEMENTS:
+        raise FMUError(
+            f"the arrays of {', '.join(list(found)[:3])[:80]} ... have {total:,} values together, more than "
+            f"{MAX_ELEMENTS:,}; check their dimensions, or the structural parameters that give them"
+        )
     ranks = Counter(base for base, _ in groups)
     for (base, rank), members in groups.items():
         members.sort(key=lambda member: member[0])

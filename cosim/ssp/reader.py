@@ -29,6 +29,7 @@ from ..errors import CosimError, WiringError, did_you_mean
 from ..fmi.file.archive import Archive, Extraction
 from ..fmi.file.model_description import read_description
 from ..fmi.fmu import FMU
+from ..fmi.interfaces import interface_of
 from ..fmi.ports import unit_definitions, unit_of
 from ..system.system import System
 from ..units import conversion
@@ -196,20 +197,21 @@ class _Reader:
     def _options(self, element: Element, where: str) -> dict[str, Any]:
         """Return the keywords of an FMU that the element and its annotation give."""
         own = own_annotation(element.xml, SSD, "participant")
-        options: dict[str, Any] = {"as_block": own.get("kind") == "block"}
-        interface = element.xml.get("implementation", "any")
-        if interface != "any":
-            options["interface"] = interface
-        if "solver" in own:
-            options["solver"] = own["solver"]
-        options |= {
-            n: flag(own[a]) for n, a in (("event_mode", "eventMode"), ("isolated", "isolated")) if a in own
+        implementation = element.xml.get("implementation", "any")
+        return {
+            "interface": interface_of(
+                str(element.xml.get("source")),
+                None if implementation == "any" else implementation,
+                solver=own.get("solver"),
+                substeps=_whole(own["substeps"], where) if "substeps" in own else None,
+                tolerance=number(own["tolerance"], where) if "tolerance" in own else None,
+                event_mode=flag(own["eventMode"]) if "eventMode" in own else None,
+            ),
+            "as_block": own.get("kind") == "block",
+            "every": _whole(own["every"], where) if "every" in own else None,
+            "sample_period": number(own["samplePeriod"], where) if "samplePeriod" in own else None,
+            "isolated": "isolated" in own and flag(own["isolated"]),
         }
-        options |= {n: _whole(own[n], where) for n in ("substeps", "every") if n in own}
-        for name, attribute in (("tolerance", "tolerance"), ("sample_period", "samplePeriod")):
-            if attribute in own:
-                options[name] = number(own[attribute], where)
-        return options
 
     def _start_values(self, element: Element, description: Any, links: list[Link]) -> dict[str, Any]:
         self.units.add_fmu(description)

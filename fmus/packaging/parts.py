@@ -11,9 +11,7 @@ from typing import Any
 from cosim import FMU, CosimError, Participant, System
 from cosim.core.component import Component
 from cosim.fmi.file.model_description import read_description
-from cosim.fmi.instance.fmi2 import Fmi2
-from cosim.fmi.instance.fmi3 import Fmi3
-from cosim.fmi.ports import FMUPort, Shape, ports
+from cosim.fmi.ports import FMUPort, Shape, ports, shape_of
 
 from ..export.fmu import export
 
@@ -32,8 +30,7 @@ class Part:
 
     def shape(self, variable: Any) -> Shape:
         """Return the shape of a variable of the FMU."""
-        adapter = Fmi2 if self.description.fmiVersion.startswith("2") else Fmi3
-        return adapter.shape(variable, self.member.start if isinstance(self.member, FMU) else {})
+        return shape_of(variable, self.member.start if isinstance(self.member, FMU) else {})
 
 
 def fmu_parts(system: System, fmi_version: str, platforms: list[str] | None) -> dict[str, Part]:

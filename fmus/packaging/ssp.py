@@ -28,7 +28,7 @@ from lxml import etree
 from cosim import FMU, System
 from cosim.core.component import Component
 from cosim.core.port import Port
-from cosim.fmi.fmu import DEFAULT_TOLERANCE
+from cosim.fmi.interfaces import ModelExchange
 from cosim.fmi.ports import FMUPort, unit_of
 from cosim.ssp.format import (
     ANNOTATION,
@@ -166,7 +166,7 @@ class _Writer:
         source = f"resources/{part.source}"
         component = _add(elements, SSD, "Component", name=part.name, type=FMU_TYPE, source=source)
         if isinstance(member, FMU) and member.interface is not None:
-            component.set("implementation", member.interface)
+            component.set("implementation", type(member.interface).__name__)
         connectors = self._connectors(part)
         section = _add(component, SSD, "Connectors") if connectors else None
         for name, (port, kind) in connectors.items():
@@ -337,9 +337,10 @@ def _facts(member: Component) -> dict[str, str]:
         if member.sample_period is not None:
             facts["samplePeriod"] = repr(member.sample_period)
     if isinstance(member, FMU):
-        facts |= {} if member.solver is None else {"solver": member.solver}
-        facts |= {} if member.substeps == 1 else {"substeps": str(member.substeps)}
-        facts |= {} if member.tolerance == DEFAULT_TOLERANCE else {"tolerance": repr(member.tolerance)}
+        if isinstance(options := member.interface, ModelExchange):
+            facts |= {} if options.solver is None else {"solver": options.solver}
+            facts |= {} if options.substeps == 1 else {"substeps": str(options.substeps)}
+            facts |= {} if options.tolerance is None else {"tolerance": repr(options.tolerance)}
         facts |= {"eventMode": "true"} if member.event_mode else {}
         facts |= {"isolated": "true"} if member.isolated else {}
     return facts

@@ -104,7 +104,7 @@ def building() -> Figure:
     drift.set_ylim(low, high + 0.18 * (high - low))
     for axes in (above, below, drift):
         axes.tick_params(labelsize=7)
-        axes.xaxis.label.set_size(7.5)
-        axes.yaxis.label.set_size(7.5)
+        axes.xaxis.label.set_fontsize(7.5)
+        axes.yaxis.label.set_fontsize(7.5)
         axes.spines[["top", "right"]].set_visible(False)
     return figure

@@ -1,13 +1,14 @@
-"""An .fmu file: a ZIP archive that may come from anywhere, checked before anything is done with it.
+"""An .fmu file: a ZIP archive from an untrusted source, checked before it is used.
 
     with Archive(Path("plant.fmu")) as archive:
         text = archive.read("modelDescription.xml")
-        extraction = archive.extraction()          # extraction.folder, for as long as it is referred to
+        extraction = archive.extraction()          # extraction.folder, while the object exists
 
 All checks are made on the directory of the archive, before a byte is unpacked: names that
 leave the folder, links, two files of one name, encryption, compression that FMI does not
-have, and sizes that no FMU has. Unpacking never writes more than the directory declares
-(zipfile stops there and compares the checksum), so declared sizes bound the actual ones.
+have, and sizes that are too large for an FMU. Files are unpacked from a stream, which stops at the
+size that the directory declares and compares the checksum there; so declared sizes bound the
+actual ones, on the disk and in memory.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ from ...errors import FMUError
 
 #: an FMU that carries a Python environment has some 50,000 files
 MAX_ENTRIES = 200_000
-#: bytes of the ZIP's directory for them: 46 of a header, and a path of up to 200 with its extra fields
+#: bytes of the ZIP's directory for them: a header of 46, and a path of up to 200 with its extra fields
 MAX_DIRECTORY = 300 * MAX_ENTRIES
 #: bytes unpacked; the largest FMUs known carry a few GB of tables and meshes
 MAX_UNPACKED = 32 * 2**30
-#: what unpacks to this much is unpacked whatever its ratio: no disk is filled by it
+#: bytes unpacked that are allowed at any ratio, because they fill no disk
 HARMLESS = 256 * 2**20
 #: unpacked over packed, above HARMLESS: tables of text reach 20, sparse matrices 100, a bomb of zeros 1000
 MAX_RATIO = 250
@@ -51,11 +52,11 @@ _Returned = TypeVar("_Returned")
 
 
 class Archive:
-    """An .fmu or .ssp file that is open, and its entries are sound; raises FMUError where they are not."""
+    """An open .fmu or .ssp file with sound entries; raises FMUError if they are not sound."""
 
     def __init__(self, path: Path, kind: str = "FMU") -> None:
         self.path = path
-        #: what it should be, for messages: "FMU" or "SSP"
+        #: its kind for messages: "FMU" or "SSP"
         self.kind = kind
         if not path.is_file():
             raise FMUError(f"there is no file {path}; give the path of an .{kind.lower()} file")
@@ -67,9 +68,9 @@ class Archive:
             self._check_directory_size()
             try:
                 self._zip = zipfile.ZipFile(self._file)
-            except Exception as error:  # zipfile lets through what a broken archive makes it meet
+            except Exception as error:  # zipfile raises exceptions of many types for a broken archive
                 raise FMUError(
-                    f"{path} is no {kind}: it is not a ZIP archive ({str(error)[:99]}); was it copied "
+                    f"{path} is not an {kind}: it is not a ZIP archive ({str(error)[:99]}); was it copied "
                     "completely?"
                 ) from error
             self._entries = self._checked()
@@ -103,11 +104,16 @@ class Archive:
             where = (
                 f"; it is in {places[0]}: pack the contents of that folder, not the folder" if places else ""
             )
-            raise FMUError(f"{self.path} is no {self.kind}: it has no {name} at its top{where}")
+            raise FMUError(f"{self.path} is not an {self.kind}: it has no {name} at its top{where}")
         entry = self._entries[name]
         if entry.file_size > MAX_XML:
             raise FMUError(f"{self.path}: {name} of {_size(entry.file_size)} is too large")
-        return self._attempt(name, lambda: self._zip.read(entry))
+        return self._attempt(name, lambda: self._bounded(entry))
+
+    def _bounded(self, entry: zipfile.ZipInfo) -> bytes:
+        """Unpack an entry without inflating more than its declared size, whatever it contains."""
+        with self._zip.open(entry) as stream:  # ZipFile.read inflates all before it cuts
+            return stream.read(entry.file_size + 1)
 
     def extraction(self) -> Extraction:
         """Return the folder with all files; FMUs of the same contents share one."""
@@ -149,8 +155,8 @@ class Archive:
     def _check_directory_size(self) -> None:
         """Refuse a directory of too many entries before zipfile makes an object of each.
 
-        Its size is at byte 12 of the end record, or at byte 40 of the ZIP64 record, which with
-        its locator stands before it (APPNOTE.TXT, 4.3.14 to 4.3.16); found as zipfile finds it.
+        Its size is at byte 12 of the end record, or at byte 40 of the ZIP64 record, which precedes
+        it with its locator (APPNOTE.TXT, 4.3.14 to 4.3.16). The records are found as zipfile does.
         """
         length = self._file.seek(0, os.SEEK_END)
         self._file.seek(max(0, length - 66_000))  # the records, and a comment of 65,535 at most
@@ -159,7 +165,7 @@ class Archive:
         at = len(tail) - 22 if plain else tail.rfind(b"PK\x05\x06")
         if at < 0 or len(tail) < at + 22:
             raise FMUError(
-                f"{self.path} is no {self.kind}: it is not a ZIP archive (it has no end); "
+                f"{self.path} is not an {self.kind}: it is not a ZIP archive (it has no end); "
                 "was it copied completely?"
             )
         (size,) = struct.unpack_from("<I", tail, at + 12)
@@ -168,15 +174,16 @@ class Archive:
         if size > MAX_DIRECTORY:
             raise FMUError(
                 f"{self.path} has a directory of {_size(size)}, too many entries for an {self.kind} "
-                f"(at most {MAX_ENTRIES:,}); where does it come from?"
+                f"(at most {MAX_ENTRIES:,}); check where it comes from"
             )
 
     def _checked(self) -> dict[str, zipfile.ZipInfo]:
-        """Return the files by path; refuse what must not be unpacked."""
+        """Return the files by path; refuse entries that must not be unpacked."""
         entries = self._zip.infolist()
         if len(entries) > MAX_ENTRIES:
             raise FMUError(
-                f"{self.path} has {len(entries):,} entries, which no {self.kind} has; is it whole?"
+                f"{self.path} has {len(entries):,} entries, too many for an {self.kind}; "
+                "check where it comes from"
             )
         files: dict[str, zipfile.ZipInfo] = {}
         for entry in entries:
@@ -195,19 +202,19 @@ class Archive:
         packed = max(self._file.seek(0, os.SEEK_END), 1)
         if total > MAX_UNPACKED or (total > HARMLESS and total > MAX_RATIO * packed):
             raise FMUError(
-                f"{self.path} of {_size(packed)} unpacks to {_size(total)}, which is a ZIP bomb "
-                f"and no {self.kind}"
+                f"{self.path} of {_size(packed)} unpacks to {_size(total)}, which is a ZIP bomb, "
+                f"not an {self.kind}"
             )
         return files
 
 
 def _fault(entry: zipfile.ZipInfo) -> str | None:
-    """Return what is wrong with an entry of an archive."""
+    """Return the fault of an entry of an archive, or None."""
     name = entry.orig_filename  # zipfile cuts `filename` at a NUL
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if not name or "\\" in name or "\0" in name or name.startswith("/") or ":" in name:
         return (
-            "is no path inside the FMU (empty, a slash at the start, a backslash, a colon, or NUL); "
+            "is not a path inside the FMU (empty, a slash at the start, a backslash, a colon, or NUL); "
             "pack it with forward slashes and relative paths"
         )
     if len(name) > MAX_PATH:
@@ -236,18 +243,18 @@ def _size(n: int) -> str:
 
 
 class Extraction:
-    """The folder of an unpacked FMU; it is removed when nothing refers to this object any more."""
+    """The folder of an unpacked FMU, which is removed together with this object."""
 
     def __init__(self) -> None:
         try:
             self.folder = Path(tempfile.mkdtemp(prefix="structcosim-"))
         except OSError as error:
-            raise FMUError(f"no folder to unpack an FMU to: {error}; set TMPDIR to one") from error
+            raise FMUError(f"an FMU cannot be unpacked: {error}; set TMPDIR to another folder") from error
         self.remove = weakref.finalize(self, _remove, str(self.folder), os.getpid())
 
 
 def _remove(folder: str, owner: int) -> None:
-    if os.getpid() == owner:  # a forked process has the object, not the folder
+    if os.getpid() == owner:  # a forked process shares the object, but does not own the folder
         shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -1,6 +1,6 @@
-"""Values that are given as text with a unit: start={"angle": "30 deg", "k": "2 kN/m"}.
+"""Values given as text with a unit: start={"angle": "30 deg", "k": "2 kN/m"}.
 
-A unit that the FMU declares as a display unit of the variable's own is converted as it says,
+A unit that the FMU declares as a display unit of the variable's own is converted by its definition,
 
     shown = factor value + offset,  or, if it is inverse (FMI 3.0),  shown = factor / value
 
@@ -24,7 +24,7 @@ _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*"
 
 @dataclass(frozen=True)
 class DisplayUnit:
-    """A unit in which a tool shows values of another one."""
+    """A unit in which a tool displays values of another unit."""
 
     name: str
     factor: float = 1.0
@@ -32,7 +32,7 @@ class DisplayUnit:
     inverse: bool = False
 
     def value(self, shown: float, relative: bool) -> float:
-        """Return in the variable's own unit what is shown in this one."""
+        """Return a value in the variable's own unit from its value in this one."""
         if self.inverse:
             return self.factor / shown
         return (shown - (0.0 if relative else self.offset)) / self.factor
@@ -52,7 +52,7 @@ def display_units(unit: Any) -> list[DisplayUnit]:
 
 
 def has_unit(text: str) -> bool:
-    """Tell whether a text is a number with a unit."""
+    """Return whether a text is a number with a unit."""
     match = _VALUE.fullmatch(text)
     return bool(match and re.match(r"[^\d\s.,+-]", match[2]))
 
@@ -73,7 +73,7 @@ def _number(where: str, port: FMUPort, units: Iterable[Any], text: str) -> float
     what = f"{where}: start value {port.name} = {text!r}"
     match = _VALUE.fullmatch(text)
     if not match or not match[2]:
-        raise FMUError(f'{what} is no number with a unit, such as "30 deg"; a number alone is given as such')
+        raise FMUError(f'{what} must be a number with a unit, such as "30 deg"; give others as floats')
     shown, given = float(match[1]), match[2]
     unit = "s" if port.type == "Clock" else port.unit  # an interval
     if unit is None:
@@ -88,7 +88,7 @@ def _number(where: str, port: FMUPort, units: Iterable[Any], text: str) -> float
             except ZeroDivisionError:
                 inverse = "the inverse of " if display.inverse else ""
                 raise FMUError(
-                    f"{what}: {given} is {inverse}{unit} times {display.factor:g}, and no value is shown so"
+                    f"{what}: {given} is {inverse}{unit} times {display.factor:g}, which no value can be"
                 ) from None
     defined = {u.name: definition_of(u.baseUnit) for u in units if u.baseUnit is not None}
     try:

@@ -1,7 +1,7 @@
-"""modelDescription.xml of an FMU: read strictly, validated by FMPy, and what FMPy takes silently refused.
+"""modelDescription.xml of an FMU: parsed strictly, validated by FMPy, and checked where FMPy is lenient.
 
-FMPy reads the XML file itself, with entities; so the text is parsed here first, and FMPy
-is given an archive in memory that has nothing else in it.
+FMPy parses the XML itself, with entities, and takes it from an archive or a file named .xml only. So
+the text is parsed here first, and FMPy gets an archive in memory that contains nothing else.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def description_of(archive: Archive) -> Any:
 def parse(archive: Archive) -> Any:
     """Return the root element of modelDescription.xml of a supported FMI version."""
     path, text = archive.path, archive.read("modelDescription.xml")
-    # libxml2 bounds depth, sizes and the growth by entities, unless it is told huge_tree
+    # libxml2 bounds depth, sizes and the growth by entities, unless huge_tree is set
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.fromstring(text, parser)
@@ -50,12 +50,14 @@ def parse(archive: Archive) -> Any:
         raise FMUError(f"{path}: modelDescription.xml is broken: {error}") from error
     if root.getroottree().docinfo.doctype:
         raise FMUError(
-            f"{path}: modelDescription.xml has a DOCTYPE, which FMI does not have and entity bombs need; "
+            f"{path}: modelDescription.xml has a DOCTYPE, which FMI does not use and entity bombs need; "
             "remove it"
         )
     version = root.get("fmiVersion", "none")
     if root.tag != "fmiModelDescription":
-        raise FMUError(f"{path}: modelDescription.xml describes no FMU but {str(root.tag)[:80]!r}")
+        raise FMUError(
+            f"{path}: modelDescription.xml must describe an FMU, and its root is {str(root.tag)[:80]!r}"
+        )
     if version != "2.0" and not re.fullmatch(r"3\.\d.*", version):
         raise FMUError(
             f"{path} has FMI version {version[:80]}; FMI 2.0 and 3.0 are supported: export it as one of them"
@@ -69,7 +71,7 @@ def _validated(archive: Archive, root: Any) -> Any:
 
     path = archive.path
     for element in root.iterfind("ModelStructure//*"):
-        for name in _LISTS:  # white space is free in a list; FMPy splits at single blanks
+        for name in _LISTS:  # a list may contain any white space; FMPy splits at single blanks
             if name in element.attrib:
                 element.set(name, " ".join(element.get(name).split()))
     for element in root.iterfind("ModelVariables/*[@clocks]"):
@@ -88,7 +90,7 @@ def _validated(archive: Archive, root: Any) -> Any:
             f"{path} has an invalid modelDescription.xml: {'; '.join(problems[:3])}{more}"
         ) from error
     except Exception as error:  # FMPy raises bare Exception, and KeyError and such for what it does not check
-        reason = str(error) if type(error) is Exception else f"it makes no sense to FMPy ({error!r})"
+        reason = str(error) if type(error) is Exception else f"FMPy cannot interpret it ({error!r})"
         raise FMUError(f"{path} has an invalid modelDescription.xml: {reason[:400]}") from error
     _check_structure(archive, root, description)
     _complete(root, description)
@@ -96,11 +98,11 @@ def _validated(archive: Archive, root: Any) -> Any:
 
 
 def _add_variability(root: Any) -> None:
-    """Make variables that are no reals discrete where it is not said, as FMI 3.0 has it.
+    """Make variables other than reals discrete where their variability is missing, as in FMI 3.0.
 
-    FMI 2.0 has the default "continuous" for all types and forbids it for all but reals, so
-    that it must be said; many files leave it out (pythonfmu's outputs, the Reference FMUs of
-    2019), and only this can be meant.
+    In FMI 2.0 the default is "continuous" for all types, and only reals may be continuous, so that
+    other types must state it. Many files leave it out (pythonfmu's outputs, the Reference FMUs of
+    2019), and can only mean this.
     """
     for element in root.iterfind("ModelVariables/ScalarVariable"):
         is_signal = element.get("causality", "local") in ("local", "input", "output")
@@ -109,7 +111,7 @@ def _add_variability(root: Any) -> None:
 
 
 def _complete(root: Any, description: Any) -> None:
-    """Read what FMPy's object has a place for and FMPy does not read."""
+    """Fill the fields of FMPy's object that FMPy does not read."""
     for unit, element in zip(description.unitDefinitions, root.iterfind("UnitDefinitions/Unit"), strict=True):
         unit.displayUnits = display_units(element)
     elements: dict[str, Any] = {}
@@ -128,7 +130,7 @@ def _complete(root: Any, description: Any) -> None:
 
 
 def _check_structure(archive: Archive, root: Any, description: Any) -> None:
-    """Refuse what validation lets through and would be another variable than meant."""
+    """Refuse references that pass FMPy's validation and would lead to another variable than meant."""
     path = archive.path
     n = len(description.modelVariables)
     if description.fmiVersion == "2.0":
@@ -137,7 +139,7 @@ def _check_structure(archive: Archive, root: Any, description: Any) -> None:
             if not all(1 <= int(i) <= n for i in listed):  # FMPy takes 0 for the last variable
                 raise FMUError(
                     f"{path}: line {unknown.sourceline} of modelDescription.xml refers to a variable by its "
-                    f"number, and there are 1 to {n}"
+                    f"number, which must be from 1 to {n}"
                 )
         inputs: dict[tuple[str, int], str] = {}
         for v in description.modelVariables:
@@ -152,4 +154,4 @@ def _check_structure(archive: Archive, root: Any, description: Any) -> None:
     for interface in (description.modelExchange, description.coSimulation):
         name = interface.modelIdentifier if interface is not None else ""
         if re.search(r"[/\\:\0]", name):
-            raise FMUError(f"{path}: modelIdentifier {name[:80]!r} is a path, and must be a file's name")
+            raise FMUError(f"{path}: modelIdentifier {name[:80]!r} is a path; it must be the name of a file")

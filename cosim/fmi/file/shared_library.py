@@ -1,4 +1,4 @@
-"""The shared library in an FMU: its place, and whether it is whole."""
+"""The shared library in an FMU: its path, and whether it is complete."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def library_name(platform: str, identifier: str) -> str:
 
 
 def check_library(path: Path) -> None:
-    """Refuse an ELF library that is cut off: the system maps it, and dies of SIGBUS where it ends.
+    """Refuse a truncated ELF library, because the system maps it and dies of SIGBUS at its end.
 
-    Anything else that is no library is refused by the loader itself. Program headers, 64-bit
+    The loader itself refuses other files that are not libraries. Program headers, 64-bit
     little-endian: type, flags, offset, virtual and physical address, size in the file, ...
     """
     try:
@@ -38,4 +38,4 @@ def check_library(path: Path) -> None:
         at, _, _, in_file = struct.unpack_from("<4Q", table, size * i + 8)
         whole = whole and at + in_file <= length
     if not whole:
-        raise FMUError(f"{path.name} is cut off at {length:,} bytes; build or copy the FMU again")
+        raise FMUError(f"{path.name} is truncated at {length:,} bytes; build or copy the FMU again")

@@ -1,9 +1,8 @@
-"""A running FMU with Co-Simulation: doStep, and what interrupts it.
+"""A running FMU with Co-Simulation: doStep, and the events that interrupt it.
 
-A step of FMI 3.0 that comes back early at t' is continued from there until t_{k+1}. In
-event mode an event that ended it is handled at t', a time event that falls into the step
-splits it, and discrete inputs that changed are set at t_k. All of this is Python, which
-the loop enters only when there is something to do.
+A step of FMI 3.0 that returns early is continued, events are handled at their instants in event
+mode, and discrete inputs that changed are set at t_k (driver.py). All of this is Python, which
+the loop enters only if a step was interrupted.
 """
 
 from __future__ import annotations
@@ -11,28 +10,32 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ...errors import FMUError
 from ...loop.fmi_operations import FMI2DoStep, FMI3DoStep
 from ...loop.operations import SLACK, Operation
 from ...loop.signals import RunSignals
 from ...result import SimulationError
-from ..clocks import Timers
-from ..fmu import FMU
-from .adapter import StepAnswer
-from .events import EVENT_ITERATIONS, EventInstance
-
-_DISCARD = 2
+from ..fmu_file import FMUFile
+from .driver import DISCARD
+from .events import EventInstance
+from .timers import Timers
 
 
 class CoSimulationInstance(EventInstance):
     """One instance of an FMU in a run, with Co-Simulation."""
 
-    def __init__(self, name: str, fmu: FMU, failures: RunSignals, used: set[str], h: float) -> None:
-        super().__init__(name, fmu, failures, used)
-        self._timers = Timers(self.fmi, fmu.clocks.values(), h)
-        self.event_mode = fmu.event_mode
-        if self.fmi.answer is not None:
-            self.event_time = self.fmi.answer.event_time
+    def __init__(
+        self,
+        name: str,
+        fmu: FMUFile,
+        signals: RunSignals,
+        used: set[str],
+        h: float,
+        event_mode: bool,
+        isolated: bool,
+    ) -> None:
+        super().__init__(name, fmu, signals, used, event_mode, isolated)
+        self._timers = Timers(self.driver, fmu.clocks.values(), h)
+        self.event_mode = event_mode
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and, in event mode, the events of the start."""
@@ -54,51 +57,22 @@ class CoSimulationInstance(EventInstance):
 
     def advance(self) -> list[Operation]:
         """Do the step."""
-        name, function = self.name, self._function(f"{self.fmi.PREFIX}DoStep")
-        common: dict[str, Any] = {"text": f"{name}: step (FMU)", "participant": name, "function": function}
-        common["component"] = self._component
-        answer = self.fmi.answer
+        common: dict[str, Any] = {
+            "text": f"{self.name}: step (FMU)",
+            "participant": self.name,
+            "function": self._function(f"{self.fmu.version.prefix}DoStep"),
+            "component": self._component,
+        }
+        answer = self.driver.answer
         if answer is None:
-            return [FMI2DoStep(discarded=self.failures.callback(name, self._discarded), **common)]
+            return [FMI2DoStep(discarded=self.signals.callback(self.name, self._discarded), **common)]
         flags, times = int(answer.flags.ctypes.data), int(answer.times.ctypes.data)
-        finish = self.failures.callback(name, lambda t, h: self._finish_step(answer, t, h))
+        finish = self.signals.callback(self.name, lambda t, h: self.driver.finish_step(t, h, self))
         return [FMI3DoStep(flags=flags, times=times, interrupted=finish, **common)]
 
-    def _resume(self) -> None:
-        self.fmi.attempt("enter step mode", self.api.enterStepMode)
-
     def _discarded(self, t: float, h: float) -> None:
-        """Find out why a step of FMI 2.0 was discarded: to end the run, or because it failed."""
-        last = self.fmi.asks_to_end()
+        """Find out why FMI 2.0 discarded a step: to end the run, or because it failed."""
+        last = self.driver.asks_to_end()
         if last is None:
-            raise SimulationError(self.fmi.logged(self.fmi.failure(_DISCARD, t)))
-        self.failures.ask_to_end(self.name, last, last >= t + h - SLACK * h)
-
-    def _finish_step(self, answer: StepAnswer, t: float, h: float) -> None:
-        """Go on with the step over [t, t + h] from where it was interrupted, until its end."""
-        end, near = t + h, SLACK * h
-        now, stuck = answer.came_to(end), 0
-        while True:
-            if answer.terminate:
-                self.failures.ask_to_end(self.name, now, now >= end - near)
-            if self.event_mode and (answer.event or self.event_time[0] <= now):
-                self._event(now, now >= end - near)
-            if now >= end - near:
-                answer.flags[:] = 0
-                return
-            if self.failures.interrupted:
-                raise KeyboardInterrupt
-            event = float(self.event_time[0])
-            # a time event at the end, to rounding, is met at its own instant
-            before, until = now, event if now < event <= end + near else end
-            self._do_step(answer, before, until - before)
-            now = answer.came_to(until)
-            stuck = 0 if now > before else stuck + 1
-            if stuck > (EVENT_ITERATIONS if self.event_mode and answer.event else 0):
-                raise FMUError(
-                    f"{self.name} returns early from its step at t = {before:g} s without getting on (the "
-                    f"communication step is from {t:g} s to {end:g} s); look at its inputs and at its log"
-                )
-
-    def _do_step(self, answer: StepAnswer, t: float, h: float) -> None:
-        answer.take(*self.fmi.attempt("do its step", lambda: self.api.doStep(t, h, False)))
+            raise SimulationError(self.driver.logged(self.driver.failure(DISCARD, t)))
+        self.end_run(last, last >= t + h - SLACK * h)

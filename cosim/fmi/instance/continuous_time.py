@@ -1,4 +1,4 @@
-"""Functions of an FMU in continuous-time mode, called from Python; the loop has them by address."""
+"""Functions of an FMU in continuous-time mode, called from Python; the loop calls them by address."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import ctypes
 from typing import Any
 
 from ...result import SimulationError
-from .adapter import Adapter
-
-_DISCARD = 2
+from .driver import DISCARD, OK, WARNING, Driver
 
 
 class ContinuousTime:
@@ -18,48 +16,48 @@ class ContinuousTime:
     SimulationError with the log of the FMU when it fails.
     """
 
-    def __init__(self, fmi: Adapter, n_states: int, n_indicators: int) -> None:
-        self.fmi = fmi
+    def __init__(self, driver: Driver, n_states: int, n_indicators: int) -> None:
+        self.driver = driver
         self.n_states = n_states
         self.n_indicators = n_indicators
-        #: the time that was set last
+        #: the last time that was set, in s
         self.t = 0.0
-        prefix = fmi.PREFIX
+        prefix = driver.VERSION.prefix
         self._set_time = self._function(f"{prefix}SetTime", ctypes.c_double)
         vector = (ctypes.c_void_p, ctypes.c_size_t)
         self._set_states = self._function(f"{prefix}SetContinuousStates", *vector)
         self._get_states = self._function(f"{prefix}GetContinuousStates", *vector)
-        self._get_derivatives = self._function(fmi.DERIVATIVES, *vector)
+        self._get_derivatives = self._function(driver.VERSION.get_derivatives, *vector)
         self._get_indicators = self._function(f"{prefix}GetEventIndicators", *vector)
         self._get_nominals = self._function(f"{prefix}GetNominalsOfContinuousStates", *vector)
 
     def _function(self, name: str, *kinds: Any) -> Any:
-        address = ctypes.cast(getattr(self.fmi.api.dll, name), ctypes.c_void_p).value or 0
+        address = ctypes.cast(getattr(self.driver.api.dll, name), ctypes.c_void_p).value or 0
         return ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)(address)
 
     def _done(self, status: int, what: str) -> None:
-        if status > 1:
-            raise SimulationError(self.fmi.logged(self.fmi.failure(status, self.t, f" to {what}")))
+        if status not in (OK, WARNING):
+            raise SimulationError(self.driver.logged(self.driver.failure(status, self.t, f" to {what}")))
 
     def set_time(self, t: float) -> None:
         """Set the time."""
         self.t = t
-        self._done(self._set_time(self.fmi.api.component, t), "set the time")
+        self._done(self._set_time(self.driver.api.component, t), "set the time")
 
     def set_states(self, x: Any) -> None:
         """Set the states, if there are any."""
         if self.n_states:
-            self._done(self._set_states(self.fmi.api.component, x, self.n_states), "set its states")
+            self._done(self._set_states(self.driver.api.component, x, self.n_states), "set its states")
 
     def get_states(self, x: Any) -> None:
         """Get the states, if there are any."""
         if self.n_states:
-            self._done(self._get_states(self.fmi.api.component, x, self.n_states), "get its states")
+            self._done(self._get_states(self.driver.api.component, x, self.n_states), "get its states")
 
     def get_derivatives(self, target: Any) -> bool:
-        """Get the derivatives; return False where the model has none and asks for a smaller step."""
-        status = self._get_derivatives(self.fmi.api.component, target, self.n_states)
-        if status == _DISCARD:
+        """Get the derivatives; return False if the model discards the call to ask for a smaller step."""
+        status = self._get_derivatives(self.driver.api.component, target, self.n_states)
+        if status == DISCARD:
             return False
         self._done(status, "get its derivatives")
         return True
@@ -67,9 +65,9 @@ class ContinuousTime:
     def get_indicators(self, target: Any) -> None:
         """Get the event indicators, if there are any."""
         if self.n_indicators:
-            status = self._get_indicators(self.fmi.api.component, target, self.n_indicators)
+            status = self._get_indicators(self.driver.api.component, target, self.n_indicators)
             self._done(status, "get its event indicators")
 
     def get_nominals(self, target: Any) -> bool:
-        """Get the nominal values of the states; return False if the model has none to tell."""
-        return bool(self._get_nominals(self.fmi.api.component, target, self.n_states) <= 1)
+        """Get the nominal values of the states; return False if the model states none."""
+        return self._get_nominals(self.driver.api.component, target, self.n_states) in (OK, WARNING)

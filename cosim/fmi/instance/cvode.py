@@ -16,9 +16,9 @@ from fmpy.sundials.sundials_context import SUNContext_PushErrHandler
 from ...result import SimulationError
 from .continuous_time import ContinuousTime
 
-#: of the tolerance that is asked for: what an internal step is controlled to
+#: tolerance of an internal step, as a fraction of the tolerance that is asked for
 TIGHTER = 1e-3
-_LEAST = 1e-13  # some hundred times the rounding of numbers, below which CVODE cannot go
+_LEAST = 1e-13  # a few hundred times the rounding of floats, the least tolerance of CVODE
 _ONE_STEP = 2  # CV_ONE_STEP: return after every internal step
 
 _set_stop_time = sundials_cvode.CVodeSetStopTime
@@ -38,13 +38,13 @@ def _free(function: str, *objects: Any) -> None:
 class Cvode(CVodeSolver):
     """The backward differentiation formulas of CVODE for one model, a step of its own at a time.
 
-    Errors of the model are kept and raised when CVODE is back: an exception in a callback
-    from C would be printed and ignored.
+    Errors of the model are kept and raised when CVODE returns, because an exception in a
+    callback from C would be printed and ignored.
 
     CVODE controls the error of an internal step, and starts at order one. Restarted at
-    every communication point it takes many small steps there, whose errors add up over a
-    run: so its steps are controlled TIGHTER than `tolerance`, at twice the work. (Van der
-    Pol, 20 s, 2000 restarts: tolerance 1e-6 leaves 1e-2 without that, and 2e-5 with it.)
+    every communication point, it takes many small steps there, whose errors add up over a
+    run. So its steps are controlled TIGHTER than `tolerance`, at twice the work. (Van der
+    Pol, 20 s, 2000 restarts: tolerance 1e-6 leaves an error of 1e-2 without that, 2e-5 with it.)
     The absolute tolerance of a state is its nominal value times the relative one.
     """
 
@@ -64,13 +64,13 @@ class Cvode(CVodeSolver):
             startTime=t,
             relativeTolerance=max(TIGHTER * tolerance, _LEAST),
         )
-        _no_warnings(self.cvode_mem, -1)  # of steps too small to be seen: EventSteps sees them
-        # what is printed by SUNDIALS itself is in our error
+        _no_warnings(self.cvode_mem, -1)  # of steps below rounding, which EventSteps detects
+        # the error raised here contains the message that SUNDIALS would print
         sundials_core.SUNContext_ClearErrHandlers(self.sunctx)
         SUNContext_PushErrHandler(self.sunctx, self.ehfun_, None)
 
     def __del__(self) -> None:
-        """Free what FMPy leaves, in the order of SUNDIALS: the integrator, its parts, the context."""
+        """Free what FMPy does not free, in the order of SUNDIALS: integrator, its parts, context."""
         if not hasattr(self, "LS"):
             return
         super().__del__()
@@ -81,8 +81,8 @@ class Cvode(CVodeSolver):
 
     def _nominals(self, target: Any, n: int) -> None:
         values = np.ctypeslib.as_array(target, (n,))
-        told = self.model.get_nominals(target)
-        values[:] = np.where(told & np.isfinite(values) & (values > 0.0), values, 1.0)
+        stated = self.model.get_nominals(target)
+        values[:] = np.where(stated & np.isfinite(values) & (values > 0.0), values, 1.0)
 
     def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
         """Evaluate the derivatives: 0, 1 for another try with a smaller step, -1 for the end."""
@@ -111,14 +111,14 @@ class Cvode(CVodeSolver):
             return -1
 
     def restart(self, t: float) -> None:
-        """Start anew at t from the states of the model, without memory of what was before."""
+        """Start anew at t from the states of the model, without memory of earlier steps."""
         self.model.get_states(self.px)
         CVodeReInit(self.cvode_mem, t, self.x)
 
     def step(self, t: float, until: float) -> tuple[float, bool]:
-        """Take one internal step, not past `until`; return where it ends and whether a root is there.
+        """Take one internal step, not past `until`; return the time reached and whether a root is there.
 
-        The model is left there, with its states set.
+        The model is left at that time, with its states set.
         """
         reached = ctypes.c_double(t)
         _set_stop_time(self.cvode_mem, until)
@@ -134,6 +134,6 @@ class Cvode(CVodeSolver):
     def _failure(self, flag: int, t: float) -> str:
         text = f": {self.error_info[3]}" if self.error_info else ""
         return (
-            f"{self.model.fmi.name}: cvode cannot go on from t = {t:g} s (code {flag}{text}); look at the "
-            "inputs that lead there, at the model's states for a singularity, or at tolerance="
+            f"{self.model.driver.name}: cvode cannot go on from t = {t:g} s (code {flag}{text}); look at the "
+            "inputs before that time, at the model's states for a singularity, or at the tolerance"
         )

@@ -1,12 +1,11 @@
 """A communication step of a Model Exchange FMU from Python, from event to event.
 
-    to the next time event, or to the end of the step:
-        integrate: by one step of CVODE, or by a fixed-step method (tableaus.py) in equal substeps
-        tell the model that the step is completed
-        at a root, a time event or where the model asks for it: event
+    until the end of the step, to the next time event or to the end:
+        integrate by one step of CVODE, or by a fixed-step method (tableaus.py) in equal substeps
+        report the completed step to the model
+        at a root, at a time event, or if the model asks for it: handle an event
 
-A time event is met exactly. What is written down of an event is what the model makes of
-it: nothing is recorded there.
+A time event is met exactly. Nothing is recorded at an event.
 """
 
 from __future__ import annotations
@@ -21,23 +20,24 @@ from ...core.variables import Array
 from ...loop.operations import SLACK
 from ...result import SimulationError
 from .continuous_time import ContinuousTime
+from .driver import Interrupts
 
-#: so many internal steps and events that bring less than so much of a step bring nothing
+#: a number of internal steps and events, and the part of a step that they must at least cover
 _PATIENCE, _LITTLE = 1000, 1e-8
 
 
-class Mover(Protocol):
-    """What integrates a model."""
+class Integrator(Protocol):
+    """An integrator of a model."""
 
     def restart(self, t: float) -> None:
         """Start at t from the states of the model."""
 
     def step(self, t: float, until: float) -> tuple[float, bool]:
-        """Go on from t, to `until` at the most; return how far, and whether a root was found there."""
+        """Go on from t, at most to `until`; return the time reached, and whether a root is there."""
 
 
 class RungeKutta:
-    """A fixed-step method, in so many substeps to the next event or the end of the step."""
+    """A fixed-step method, in equal substeps to the next event or the end of the step."""
 
     def __init__(self, model: ContinuousTime, solver: str, substeps: int) -> None:
         self.model = model
@@ -67,8 +67,8 @@ class RungeKutta:
             self.model.set_states(x.ctypes.data)
             if self.model.n_states and not self.model.get_derivatives(self.slopes[i].ctypes.data):
                 raise SimulationError(
-                    f"{self.model.fmi.name} has no derivatives at t = {t + node * h:g} s (fmi2Discard); "
-                    'take a smaller step, or solver="cvode"'
+                    f"{self.model.driver.name} has no derivatives at t = {t + node * h:g} s (it discards the "
+                    'call); take a smaller step, or ModelExchange(solver="cvode")'
                 )
         self.x += h * _weighted(weights, self.slopes)
 
@@ -79,61 +79,57 @@ def _weighted(weights: tuple[float, ...], slopes: Array) -> Array:
 
 
 class EventSteps:
-    """Carries a model over communication steps; `event` handles what happens at an instant.
+    """Carries a model over communication steps.
 
     completed
-        tells the model of a completed step at t; returns whether it asks for an event
-    event
-        handles an event at t; both know whether that is at the end of the communication step
-    next_event
-        (1,) time of the next time event, infinity if there is none
+        reports a completed step at t to the model, and whether t is the end of the communication
+        step; returns whether an event is to be handled
+    owner
+        handles the events
     """
 
     def __init__(
         self,
         model: ContinuousTime,
-        mover: Mover,
+        integrator: Integrator,
         completed: Callable[[float, bool], bool],
-        event: Callable[[float, bool], None],
-        next_event: Array,
-        interrupted: Callable[[], bool],
+        owner: Interrupts,
     ) -> None:
         self.model = model
-        self.mover = mover
+        self.integrator = integrator
         self.completed = completed
-        self.event = event
-        self.next_event = next_event
-        self.interrupted = interrupted
+        self.owner = owner
+        self.next_event = model.driver.event_time
 
     def carry(self, t: float, h: float) -> None:
         """Carry the model from t to t + h with its inputs as they are."""
         end, steps, before = t + h, 0, t
-        self.mover.restart(t)
+        self.integrator.restart(t)
         while True:
             timed = self.next_event[0] <= end + SLACK * h
             until = max(t, self.next_event[0]) if timed else end
             root = False
             if until - t > 100.0 * np.spacing(max(abs(t), abs(until))):
-                t, root = self.mover.step(t, until)
+                t, root = self.integrator.step(t, until)
             else:
                 t = until
                 self.model.set_time(t)
             at_end = t >= end - SLACK * h
             asked = self.completed(t, at_end)
             if root or asked or (timed and t >= until):
-                self.event(t, at_end)
+                self.owner.handle_event(t, at_end)
                 if t < end:
-                    self.mover.restart(t)
+                    self.integrator.restart(t)
             if t >= end:
                 return
-            if self.interrupted():
+            if self.owner.is_interrupted():
                 raise KeyboardInterrupt
             steps += 1
             if steps % _PATIENCE == 0:
                 if t - before < _LITTLE * h:
                     raise SimulationError(
-                        f"{self.model.fmi.name} does not come beyond t = {t:.15g} s in {_PATIENCE} internal "
-                        "steps and events; do its events accumulate there, do its states grow "
-                        "without bound, or is tolerance= too small?"
+                        f"{self.model.driver.name} does not get past t = {t:.15g} s in {_PATIENCE} internal "
+                        "steps and events; check whether its events accumulate there, its states grow "
+                        "without bound, or the tolerance is too small"
                     )
                 before = t

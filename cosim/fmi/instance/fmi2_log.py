@@ -1,8 +1,9 @@
-"""The logger of FMI 2.0 FMUs: one for the process, since FMPy's native proxy knows only one.
+"""The logger of FMI 2.0 FMUs: one for the process, because FMPy's native proxy knows only one.
 
-The proxy formats what an FMU logs, as printf does, and hands it to the logger that was added
-last, whichever FMU it comes from. So the one that is added here stays, and finds the instance by
-the environment that the FMU hands back; lines of FMUs that FMPy itself runs are printed, as FMPy does.
+The proxy formats the lines of an FMU's log, as printf does, and passes them to the logger that was
+added last, whichever FMU they come from. So the logger that is added here stays, and finds the
+instance by the environment that the FMU passes back. Lines of FMUs that FMPy itself runs are
+printed, as FMPy does.
 """
 
 from __future__ import annotations
@@ -10,19 +11,25 @@ from __future__ import annotations
 import ctypes
 from functools import lru_cache
 from itertools import count
-from typing import Any
+from typing import Any, Protocol
 from weakref import WeakValueDictionary
 
-from .adapter import Adapter
 
-_instances: WeakValueDictionary[int, Adapter] = WeakValueDictionary()
+class Noting(Protocol):
+    """An instance that keeps the lines of its log."""
+
+    def note(self, status: int, message: bytes | None) -> None:
+        """Keep a line."""
+
+
+_instances: WeakValueDictionary[int, Noting] = WeakValueDictionary()
 _numbers = count(1)
 
 
-def callbacks(instance: Adapter | None = None) -> Any:
+def callbacks(instance: Noting | None = None) -> Any:
     """Return the callbacks for a new instance of an FMU, its logger among them.
 
-    Without an instance: what makes the process' logger the one in use again, after FMPy added another.
+    Without an instance, this puts the process' logger back in use after FMPy has added another.
     """
     from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions
     from fmpy.logging import addLoggerProxy
@@ -42,10 +49,10 @@ def callbacks(instance: Adapter | None = None) -> Any:
 def _logger() -> Any:
     from fmpy.fmi2 import fmi2CallbackLoggerTYPE
 
-    return fmi2CallbackLoggerTYPE(_hand_over)
+    return fmi2CallbackLoggerTYPE(_pass_on)
 
 
-def _hand_over(environment: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
+def _pass_on(environment: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
     instance = _instances.get(environment or 0)
     if instance is not None:
         instance.note(status, message)

@@ -1,10 +1,10 @@
-"""A running FMU with Model Exchange: integrated here, its events handled.
+"""A running FMU with Model Exchange: it is integrated and its events are handled here.
 
 Under sampled coupling it is integrated over each communication step with its inputs held:
 by CVODE, from event to event (event_steps.py), or by a fixed-step method in equal
-substeps. That one runs in the compiled loop; a step in which a time event is due is
-split there, and a state event is handled at the end of the step. Under stage coupling it
-is integrated by the method of all, with one step for all: events are handled at its end.
+substeps. The latter runs in the compiled loop; a step that contains a time event is
+split there, and a state event is handled at the end of the step. Under stage coupling the
+solver of the run integrates it, with one step for all participants; events are handled at its end.
 """
 
 from __future__ import annotations
@@ -21,33 +21,44 @@ from ...loop.fmi_operations import CompletedStep, End, Repeat, SetTime, UnlessEv
 from ...loop.instance import buffer
 from ...loop.operations import SLACK, Call, Combine, Copy, Operation
 from ...loop.signals import RunSignals
-from ..fmu import FMU
+from ..fmu_file import FMUFile
+from ..interfaces import DEFAULT_TOLERANCE, ModelExchange
 from .continuous_time import ContinuousTime
 from .event_steps import EventSteps, RungeKutta
 from .events import EventInstance
 
 
 class ModelExchangeInstance(EventInstance):
-    """One instance of an FMU in a run, with Model Exchange."""
+    """One instance of an FMU in a run, with Model Exchange; its options have a solver."""
 
     model_exchange: ClassVar[bool] = True
 
-    def __init__(self, name: str, fmu: FMU, failures: RunSignals, used: set[str]) -> None:
-        super().__init__(name, fmu, failures, used)
+    def __init__(
+        self,
+        name: str,
+        fmu: FMUFile,
+        signals: RunSignals,
+        used: set[str],
+        options: ModelExchange,
+        isolated: bool,
+    ) -> None:
+        super().__init__(name, fmu, signals, used, isolated=isolated)
         try:
-            self.n_states, self.n_indicators = self.fmi.counts()
+            self.n_states, self.n_indicators = self.driver.counts()
         except CosimError:
             self.stop()
             raise
         self.states = buffer(self.n_states)
         self.state_address = int(self.states.ctypes.data)
-        self.flags = np.zeros(2, dtype=self.fmi.FLAG)
+        self.flags = np.zeros(2, dtype=fmu.version.flag)
         self.signs = buffer(self.n_indicators) > 0.0
         self.stages = buffer(5 * self.n_states)
-        self._event_callback = 0
-        self.model = ContinuousTime(self.fmi, self.n_states, self.n_indicators)
-        #: what integrates it under sampled coupling
-        self.solver = fmu.solver or ("cvode" if self.n_indicators else "ode4")
+        self.event_address = 0
+        self.model = ContinuousTime(self.driver, self.n_states, self.n_indicators)
+        self.options = options
+        #: the solver of sampled coupling
+        self.solver = str(options.solver)
+        self.tolerance = options.tolerance or DEFAULT_TOLERANCE
         self.steps: EventSteps | None = None
         self.is_late = False
 
@@ -65,21 +76,19 @@ class ModelExchangeInstance(EventInstance):
     def advance(self) -> list[Operation]:
         """Integrate over the step, with the inputs held."""
         if self.solver == "cvode":
-            text = f"{self.name}: cvode, tolerance {self.fmu.tolerance:g}, from event to event"
-            carry = self.failures.callback(self.name, self._carry_by_cvode)
-            return [
-                Call(text=f"{text} (FMU, Python callback)", function=carry, participant=self.name),
-            ]
-        split = self.failures.callback(self.name, self._carry_by_fixed_steps)
+            text = f"{self.name}: cvode, tolerance {self.tolerance:g}, from event to event"
+            carry = self.signals.callback(self.name, self._carry_by_cvode)
+            return [Call(text=f"{text} (FMU, Python callback)", function=carry, participant=self.name)]
+        split = self.signals.callback(self.name, self._carry_by_fixed_steps)
         event_time = int(self.event_time.ctypes.data)
-        text = f"{self.name}: {self.solver}, {self.fmu.substeps} substeps, split at time events (FMU)"
+        text = f"{self.name}: {self.solver}, {self.options.substeps} substeps, split at time events (FMU)"
         unless = UnlessEvent(text=text, split=split, event_time=event_time, participant=self.name)
         return [unless, *self._fixed_steps(), End(participant=self.name)]
 
     def _fixed_steps(self) -> list[Operation]:
         """Integrate by Runge-Kutta over the model's derivatives."""
         nodes, rows, weights = TABLEAUS[self.solver]
-        n, base = self.fmu.substeps, int(self.stages.ctypes.data)
+        n, base = self.options.substeps, int(self.stages.ctypes.data)
         part = 1.0 / n
         ops: list[Operation] = [Copy(source=self.state_address, target=base, count=self.n_states)]
         for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
@@ -112,39 +121,37 @@ class ModelExchangeInstance(EventInstance):
 
     def set_states(self, fraction: float, substeps: int = 1) -> list[Operation]:
         """Set time and states."""
+        prefix = self.fmu.version.prefix
         time = SetTime(
-            function=self._function(f"{self.fmi.PREFIX}SetTime"),
+            function=self._function(f"{prefix}SetTime"),
             component=self._component,
             fraction=fraction,
             substeps=substeps,
             participant=self.name,
         )
-        states = f"{self.fmi.PREFIX}SetContinuousStates"
+        states = f"{prefix}SetContinuousStates"
         return [time, self._vector(states, self.state_address)] if self.n_states else [time]
 
     def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Get the derivatives into `target`."""
-        return [self._vector(self.fmi.DERIVATIVES, target)] if self.n_states else []
+        return [self._vector(self.fmu.version.get_derivatives, target)] if self.n_states else []
 
     def complete(self) -> list[Operation]:
-        """Tell the model that a step is completed; handle its events."""
-        # always told, even where the model says that it need not be: FMPy reads that flag inverted
-        function = self._function(f"{self.fmi.PREFIX}CompletedIntegratorStep")
-        events = self._event_callback = self._event_callback or self.failures.callback(
-            self.name, self._handle_events
-        )
+        """Report a completed step to the model; handle its events."""
+        self.event_address = self.event_address or self.signals.callback(self.name, self._handle_events)
+        # always, even if the model states that it need not be told: FMPy reads that flag inverted
         completed = CompletedStep(
-            function=function,
+            function=self._function(f"{self.fmu.version.prefix}CompletedIntegratorStep"),
             component=self._component,
             flags=int(self.flags.ctypes.data),
             event_time=int(self.event_time.ctypes.data),
-            events=events,
+            events=self.event_address,
             boolean=f"i{8 * self.flags.itemsize}",
             fraction=1.0,
             participant=self.name,
         )
         text = f"{self.name}: events (Python callback)"
-        call = Call(text=text, function=events, fraction=1.0, participant=self.name)
+        call = Call(text=text, function=self.event_address, fraction=1.0, participant=self.name)
         return [completed, call] if self.n_indicators else [completed]
 
     # ------------------------------------------------------------------ steps in Python
@@ -153,38 +160,31 @@ class ModelExchangeInstance(EventInstance):
         if self.steps is None:
             from .cvode import Cvode
 
-            self.steps = self._event_steps(Cvode(self.model, t, self.fmu.tolerance))
+            self.steps = self._event_steps(Cvode(self.model, t, self.tolerance))
         self.model.set_time(t)
         signs = self._indicator_signs()
-        if (signs != self.signs).any():  # the inputs that are new at t have led to an event
-            self._event(t, False)
+        if (signs != self.signs).any():  # the new inputs at t have caused an event
+            self.handle_event(t, False)
         self.steps.carry(t, h)
         self.model.get_states(self.state_address)
         self.signs[:] = self._indicator_signs()
 
     def _carry_by_fixed_steps(self, t: float, h: float) -> None:
         if self.steps is None:
-            self.steps = self._event_steps(RungeKutta(self.model, self.solver, self.fmu.substeps))
+            self.steps = self._event_steps(RungeKutta(self.model, self.solver, self.options.substeps))
         self.model.set_time(t)
         self.steps.carry(t, h)
         self.model.get_states(self.state_address)
 
-    def _event_steps(self, mover: Any) -> EventSteps:
-        return EventSteps(
-            self.model,
-            mover,
-            completed=self._completed,
-            event=self._event,
-            next_event=self.event_time,
-            interrupted=lambda: self.failures.interrupted,
-        )
+    def _event_steps(self, integrator: Any) -> EventSteps:
+        return EventSteps(self.model, integrator, self._completed, self)
 
     def _completed(self, t: float, at_end: bool) -> bool:
-        """Tell the model of a completed step; return whether that asks for an event."""
-        event, end = self.fmi.attempt("complete a step", self.api.completedIntegratorStep)
+        """Report a completed step to the model; return whether an event is to be handled."""
+        event, end = self.driver.attempt("complete a step", self.api.completedIntegratorStep)
         if end:
-            self.failures.ask_to_end(self.name, t, at_end)
-        if event or self.solver == "cvode":  # which finds state events itself
+            self.end_run(t, at_end)
+        if event or self.solver == "cvode":  # cvode finds state events itself
             return bool(event)
         return bool((self._indicator_signs() != self.signs).any())
 
@@ -196,39 +196,40 @@ class ModelExchangeInstance(EventInstance):
         return z > 0.0
 
     def _handle_events(self, t: float, h: float) -> None:
-        """Handle what happened in a step of the compiled loop, which ends at t."""
+        """Handle the events of a step of the compiled loop, which ends at t."""
         if self.flags[1]:
-            self.failures.ask_to_end(self.name, t, True)
+            self.end_run(t, True)
         signs = self._indicator_signs()
         due = float(self.event_time[0])
         timed = due <= t + SLACK * h
         if timed and due >= t - SLACK * h:
-            self.model.set_time(due)  # exactly: t is it to rounding
+            self.model.set_time(due)  # exactly; t equals it to rounding only
         elif due < t - SLACK * h:
             self._warn_late(
-                f"a time event at t = {due:g} s, inside the step to t = {t:g} s, and is told at its end: "
-                "stage coupling has one step for all participants; choose one that meets the event, or "
-                "sampled coupling"
+                f"a time event at t = {due:g} s, inside the step to t = {t:g} s, which is handled at its "
+                "end: stage coupling has one step for all participants; choose a step that meets the event, "
+                "or sampled coupling"
             )
         changed = bool((signs != self.signs).any())
         if changed and not timed:
             self._warn_late(
                 f"a state event in the step to t = {t:g} s, which is handled at its end: steps are "
-                'fixed; take smaller ones, or sampled coupling with solver="cvode", which locates it'
+                'fixed; take smaller ones, or sampled coupling with ModelExchange(solver="cvode"), '
+                "which locates it"
             )
         if timed or self.flags[0] or changed:
-            self._event(t, True)
+            self.handle_event(t, True)
         else:
             self.signs[:] = signs
 
     def _warn_late(self, what: str) -> None:
-        """Say once what is handled late."""
+        """Warn once that an event is handled late."""
         if not self.is_late:
             self.is_late = True
             warnings.warn(f"{self.name} has {what}", LateEventWarning, stacklevel=3)
 
     def _resume(self) -> None:
-        self.fmi.attempt("enter continuous-time mode", self.api.enterContinuousTimeMode)
+        super()._resume()
         self.model.get_states(self.state_address)
         self.signs[:] = self._indicator_signs()
 

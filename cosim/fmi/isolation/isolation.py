@@ -106,9 +106,9 @@ class Isolation:
     Raises FMUError if the library cannot be loaded.
     """
 
-    def __init__(self, name: str, library: Path, failures: RunSignals) -> None:
+    def __init__(self, name: str, library: Path, signals: RunSignals) -> None:
         self.name = name
-        self.failures = failures
+        self.signals = signals
         #: how the process ended unexpectedly, or ""
         self.crash = ""
         #: whether no call is possible any more: the process ended, or Ctrl-C came during a call
@@ -134,7 +134,7 @@ class Isolation:
     def _interrupted_or_ended(self, _: int, t: float, h: float) -> int:
         """Return whether waiting for the process is over; called a few times a second."""
         try:
-            if self.failures.interrupted:
+            if self.signals.interrupted:
                 raise KeyboardInterrupt
             code = self._process.poll()
             if code is not None:
@@ -143,7 +143,7 @@ class Isolation:
             return int(self.is_gone)
         except BaseException as exception:  # Ctrl-C, which C code cannot raise
             self.is_gone = True
-            self.failures.exception, self.failures.participant, self.failures.time = exception, self.name, t
+            self.signals.exception, self.signals.participant, self.signals.time = exception, self.name, t
             return 1
 
     def _ending(self, code: int) -> str:
@@ -161,8 +161,8 @@ class Isolation:
 
     def raise_interrupted(self) -> None:
         """Raise KeyboardInterrupt if a call failed because of Ctrl-C."""
-        if isinstance(self.failures.exception, KeyboardInterrupt):
-            raise self.failures.exception
+        if isinstance(self.signals.exception, KeyboardInterrupt):
+            raise self.signals.exception
 
     def close(self) -> None:
         """End the process; no function of the instance may be called after that."""

@@ -20,6 +20,7 @@ from cosim import (
     FMUError,
     Input,
     LinearContinuous,
+    ModelExchange,
     Parameter,
     RecordError,
     Result,
@@ -190,7 +191,7 @@ def test_the_command_writes_what_it_finds(folder, tmp_path, monkeypatch, capsys)
     assert lines[-1].startswith("10 steps in ")
     assert "peak chain.a[2]" in lines[1]
     kept = json.loads(Path("out/chain/metrics.json").read_text())
-    fmu = FMU(folder / "chain.fmu", interface="ModelExchange", solver="ode2", start={"k": 5.0})
+    fmu = FMU(folder / "chain.fmu", interface=ModelExchange("ode2"), start={"k": 5.0})
     wanted = simulate(System({"chain": fmu}), step=0.1, stop=1.0, record=["chain.a"])
     assert kept["metrics"]["peak chain.a[1]"]["value"] == np.abs(wanted["chain.a"][:, 0]).max()
     assert np.array_equal(Result.load("out/chain/result.npz")["chain.a"], wanted["chain.a"])
@@ -215,7 +216,7 @@ def test_a_matrix_is_given_row_by_row(tmp_path):
     study = fmu_study(path)
     result = study(stop=1.0, step=0.5, start=("A=1 2 3, 4 5 6", "u=1 10 100"), record=("x",)).run()
     assert result["mixer.x"][-1] == pytest.approx([321.0, 654.0], rel=1e-15)
-    with pytest.raises(FMUError, match=r"A = \[1\.0, 2\.0\] is no Float64 of shape \(2, 3\)"):
+    with pytest.raises(FMUError, match=r"A = \[1\.0, 2\.0\] does not fit type Float64 of shape \(2, 3\)"):
         study(stop=1.0, step=0.5, start=("A=1 2",)).run()
 
 

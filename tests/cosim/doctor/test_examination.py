@@ -63,7 +63,7 @@ def bad(tmp_path_factory):
 
 
 def probed(path, name: str, interface: str) -> tuple[str, str]:
-    """Run a probe in this process, for what does not end it."""
+    """Run a probe in this process; for faults that do not end it."""
     planned = next(p for p in PROBES if p.name == name)
     done: list[str] = []
     try:
@@ -90,7 +90,7 @@ def test_an_fmu_of_ours_has_nothing_above_a_note(tmp_path, name, version):
 
 
 def test_the_model_of_the_faults_has_none_of_itself(bad):
-    """So what is found below is the fault's. The step is exact: h and h / 2 differ by rounding."""
+    """So the findings below come from the faults. The step is exact: h and h / 2 differ by rounding."""
     planned = [(p.name, i) for p in PROBES for i in p.interfaces]
     found = {(name, interface): probed(bad("good"), name, interface) for name, interface in planned}
     assert {level for level, _ in found.values()} == {"ok"}, found
@@ -119,7 +119,7 @@ def test_the_report_is_that_of_the_probes(bad):
     [
         ("no instance", "instance", [CS, ME], "error", "failed to instantiate"),
         ("no initialization", "instance", [CS, ME], "error", "failed to enter initialization"),
-        ("endless event", "instance", [ME], "error", "an event does not end"),
+        ("endless event", "instance", [ME], "error", "the event at t = 0 s does not end"),
         ("not finite", "initial values", [CS, ME], "error", "not finite: x"),
         ("derivative not finite", "initial values", [ME], "error", "not finite: derivatives"),
         ("indicator not finite", "initial values", [ME], "error", "not finite: event indicators"),
@@ -135,9 +135,9 @@ def test_the_report_is_that_of_the_probes(bad):
         ("euler", "step size", [CS], "note", r"h / 2 the run differs by 0\.0\d* of its range"),
         ("extra per step", "step size", [CS], "warning", r"differs by \S+ of its range \(\w, h = 0\.25 s"),
         ("steps of 0.25", "step size", [CS], "note", r"takes no step of 0\.125 s; a variable step is not"),
-        ("silent", "step before initialization", [CS], "warning", "taken without a word: do a step before"),
-        ("silent", "negative step", [CS], "warning", r"taken without a word: do a step of -0\.25 s"),
-        ("silent", "unknown value reference", [CS, ME], "warning", "taken without a word: get value ref"),
+        ("silent", "step before initialization", [CS], "warning", "accepted without an error: do a step"),
+        ("silent", "negative step", [CS], "warning", r"accepted without an error: do a step of -0\.25 s"),
+        ("silent", "unknown value reference", [CS, ME], "warning", "accepted without an error: get value"),
     ],
 )  # fmt: skip
 def test_a_fault_is_found(bad, fault, name, interfaces, level, words):
@@ -210,11 +210,19 @@ def test_dependencies_that_are_not_listed_are_named(tmp_path):
     assert (level, words.partition("; ")[2]) == ("note", "no dependencies listed, which means all: i_out")
 
 
-def test_an_fmu_that_can_be_there_once_only_is_left_in_peace(tmp_path):
+def test_an_fmu_with_one_instance_per_process_is_not_instantiated_twice(tmp_path):
     path = probe(tmp_path / "once.fmu", "3.0", once=True)
     for name in ("leak", "several instances", "step size"):
         assert probed(path, name, CS) == ("note", "not tried: only one instance in a process, as declared")
     assert probed(path, "state", CS)[1] == "not declared: it cannot be saved and returned to"
+
+
+def test_python_files_of_the_current_folder_are_not_run(bad, tmp_path, monkeypatch):
+    """A probe imports json, of which an untrusted folder may hold a version of its own."""
+    (tmp_path / "json.py").write_text("open('executed', 'w').close()\n")
+    monkeypatch.chdir(tmp_path)
+    assert probed(bad("good"), "instance", CS)[0] == "ok"
+    assert not (tmp_path / "executed").exists()
 
 
 # --------------------------------------------------------------------------- command line
@@ -242,13 +250,13 @@ def test_the_command_line(bad, capsys, tmp_path):
     assert run(capsys, str(bad("good")), "--probe", "reset")[0] == 0
     (tmp_path / "no.fmu").write_text("no")
     code, text = run(capsys, str(tmp_path / "no.fmu"))
-    assert (code, "is no FMU" in text) == (2, True)
+    assert (code, "is not an FMU" in text) == (2, True)
     code, text = run(capsys, str(bad("good")), "--probe", "rest")
     assert (code, "did you mean 'reset'" in text) == (2, True)
 
 
 def test_nothing_is_left_behind(bad, tmp_path, monkeypatch):
-    """A process that dies cannot remove what it unpacked; its folder goes nevertheless."""
+    """A process that dies cannot remove the FMU that it unpacked; its folder is removed nevertheless."""
     import tempfile
 
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

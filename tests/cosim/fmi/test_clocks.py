@@ -145,13 +145,13 @@ def test_clocks_that_are_refused(path, tmp_path):
         with pytest.raises(FMUError, match=f"clock c has a {kind} interval, which is not supported"):
             FMU(other)
     xml = '<Clock name="c" valueReference="50" causality="input" intervalVariability="constant"/>'
-    with pytest.raises(FMUError, match="clock c has a constant interval, and none in the model description"):
+    with pytest.raises(FMUError, match="clock c has a constant interval, which the model descr"):
         FMU(metronome(tmp_path / "none.fmu", clocks=True, clock=xml))
-    with pytest.raises(FMUError, match=r"clock kick has no interval to give \(it is triggered\)"):
+    with pytest.raises(FMUError, match=r"clock kick takes no interval \(it is triggered\)"):
         FMU(path, start={"kick": 0.5})
-    with pytest.raises(FMUError, match="start value tick = 'fast' is no number with a unit"):
+    with pytest.raises(FMUError, match="start value tick = 'fast' must be a number with a unit"):
         FMU(path, start={"tick": "fast"})
-    with pytest.raises(FMUError, match=r"clock own has no interval, .* give one: start=\{'own': 0\.01\}"):
+    with pytest.raises(FMUError, match=r"own has an interval neither .* give one: start=\{'own': 0\.01\}"):
         simulate(System({"m": FMU(path, start={"own_period": -1.0})}), step=H, stop=5.0)
 
 

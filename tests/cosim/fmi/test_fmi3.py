@@ -1,4 +1,4 @@
-"""FMI 2.0 and 3.0 through one class: what one version gives, the other gives, and what only 3.0 has.
+"""FMI 2.0 and 3.0 through one class: the same results from both versions, and the features of 3.0.
 
 The FMUs are exported by us where we can, and c/probe.h where the exporter has no such thing.
 """
@@ -166,7 +166,7 @@ def test_a_request_to_end_within_a_step(probes, version, tmp_path):
 
 
 def test_after_a_request_to_end(probes):
-    """Nothing runs on, but what was saved before can be returned to."""
+    """The run cannot continue, but an earlier snapshot can be restored."""
     with Simulation(System({"r": Ramp(), "p": FMU(probes["2.0"], start={"end_at": 3 * H})}), step=H) as run:
         with pytest.warns(SimulationEndedWarning):
             run.run(5 * H)
@@ -175,7 +175,7 @@ def test_after_a_request_to_end(probes):
 
 
 def test_an_early_return_is_continued(probes):
-    """x moves by what every doStep covers; FMI 2.0 can only discard a step, which ends the run."""
+    """x moves by the time that every doStep covers; FMI 2.0 can only discard a step, which ends the run."""
     system = System({"p": FMU(probes["3.0"], start={"early_at": 4.5 * H})})
     assert list(simulate(system, step=H, stop=9 * H)["p.x"]) == [k * H % 1.0 for k in range(10)]
     system = System({"p": FMU(probes["2.0"], start={"early_at": 4.5 * H})})
@@ -194,11 +194,13 @@ def test_numbers_that_a_type_does_not_hold(probes, version):
             simulate(
                 System({"r": Ramp(), "p": FMU(probes[version])}, [("r.u", f"p.{target}")]), step=H, stop=1.125
             )
-    with pytest.raises(FMUError, match=r"start value i_in = 2147483648 is no Int.* \(a whole number from"):
+    with pytest.raises(
+        FMUError, match=r"start value i_in = 2147483648 does not fit type Int.* \(a whole number from"
+    ):
         FMU(probes[version], start={"i_in": 2**31})
-    with pytest.raises(FMUError, match="start value b_in = 2 is no Boolean"):
+    with pytest.raises(FMUError, match="start value b_in = 2 does not fit type Boolean"):
         FMU(probes[version], start={"b_in": 2})
-    with pytest.raises(FMUError, match="start value label = 3 is no String"):
+    with pytest.raises(FMUError, match="start value label = 3 does not fit type String"):
         FMU(probes[version], start={"label": 3})
 
 
@@ -283,16 +285,16 @@ def test_structural_parameters_size_arrays(probes):
     last = 2.0 + 3.0 * H
     assert result["p.v_out"].tolist() == [[8.0, 6.0, 4.0, 2.0]] * 2 + [[8.0, 6.0, 2 * last, 2.0]]
     assert result["p.v_in[2]"].tolist() == [2.0, 2.0, last]
-    with pytest.raises(FMUError, match=r"v_in = .* is no Float64 of shape \(4,\)"):
+    with pytest.raises(FMUError, match=r"v_in = .* does not fit type Float64 of shape \(4,\)"):
         FMU(probes["3.0"], start={"n": 4, "v_in": [1.0, 2.0, 3.0]})
-    with pytest.raises(FMUError, match=r"start value n = 1\.5 is no UInt64"):
+    with pytest.raises(FMUError, match=r"start value n = 1\.5 does not fit type UInt64"):
         FMU(probes["3.0"], start={"n": 1.5})
 
 
 def test_binary_start_values(probes):
     fmu = FMU(probes["3.0"], start={"blob": bytes([1, 2, 250])})
     assert simulate(System({"p": fmu}), step=H, stop=H)["p.blob_sum"][-1] == 253.0
-    with pytest.raises(FMUError, match="start value blob = 'text' is no Binary"):
+    with pytest.raises(FMUError, match="start value blob = 'text' does not fit type Binary"):
         FMU(probes["3.0"], start={"blob": "text"})
 
 
@@ -352,7 +354,7 @@ def test_blocks_as_fmus_in_a_cycle_and_at_solver_stages(tmp_path):
         system.connect("b.y", "a.x")
     with pytest.raises(WiringError, match=r"a \(twice\.fmu\) stands for a block at every stage .* every=1"):
         simulate(system, step=0.1, stop=1.0, coupling="continuous")
-    with pytest.raises(FMUError, match="every and sample_period are those of a block; say as_block=True"):
+    with pytest.raises(FMUError, match="every and sample_period belong to a block; give as_block=True"):
         FMU(path, every=2)
     plant = export(Chain(), tmp_path / "me.fmu", interfaces=["ModelExchange"])
     with pytest.raises(FMUError, match="as_block=True needs Co-Simulation"):

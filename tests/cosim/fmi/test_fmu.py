@@ -12,6 +12,7 @@ import pytest
 from cosim import (
     FMU,
     FMUError,
+    ModelExchange,
     SimulationError,
     System,
     WiringError,
@@ -41,14 +42,16 @@ def test_python_and_fmu_give_the_same_trajectory(fmu_path, options):
 
 def test_model_exchange_alone_is_integrated_in_substeps(tmp_path):
     path = export(Chain(), tmp_path / "me.fmu", interfaces=["ModelExchange"])
-    result = simulate(closed(FMU(path, substeps=2)), step=0.02, stop=2.0, record=["plant.a"])
+    result = simulate(
+        closed(FMU(path, interface=ModelExchange(substeps=2))), step=0.02, stop=2.0, record=["plant.a"]
+    )
     exact = simulate(closed(Chain()), step=0.02, stop=2.0, record=["plant.a"])
     # ode4 with h = 0.01: (2 h)^5 / 120 of error a step at most, over 200 steps; Euler would give 1e-2
     assert result["plant.a"] == pytest.approx(exact["plant.a"], abs=1e-8)
 
 
 def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
-    """u[2] is not connected: it has the value that it was given, at every step."""
+    """u[2] is not connected: it keeps its start value at every step."""
     plant = Chain(k=5.0, u=[0.0, 1.5])
     fmu = FMU(fmu_path, start={"k": 5.0, "u": [0.0, 1.5]})
     runs = [simulate(closed(p), step=0.01, stop=1.0, record=["plant.a"]) for p in (plant, fmu)]
@@ -59,11 +62,11 @@ def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
     ("start", "words"),
     [
         ({"kk": 1.0}, "no variable 'kk'; did you mean 'k'"),
-        ({"k": "stiff"}, "start value k = 'stiff' is no number with a unit"),
-        ({"k": np.nan}, "is no Real"),
+        ({"k": "stiff"}, "start value k = 'stiff' must be a number with a unit"),
+        ({"k": np.nan}, "does not fit type Real"),
         ({1: 2.0}, "has no variable '1'"),
         ([1.0, 2.0], r"start=\[1.0, 2.0\] has no names"),
-        ({"u": [1.0, 2.0, 3.0]}, r"is no Real of shape \(2,\)"),
+        ({"u": [1.0, 2.0, 3.0]}, r"does not fit type Real of shape \(2,\)"),
     ],
 )
 def test_wrong_start_values_are_refused(fmu_path, start, words):
@@ -71,15 +74,24 @@ def test_wrong_start_values_are_refused(fmu_path, start, words):
         FMU(fmu_path, start=start)
 
 
-@pytest.mark.parametrize(("options", "words"), [
-    ({"interface": ["CoSimulation"]}, "is not known"), ({"interface": 2}, "interface '2' is not known"),
-    ({"solver": 4, "interface": "ModelExchange"}, "solver '4' is not known"),
-])  # fmt: skip
-def test_options_that_are_none(fmu_path, options, words):
-    with pytest.raises(FMUError, match=words):
-        FMU(fmu_path, **options)
-    with pytest.raises(FMUError, match="None is no path of an FMU"):
+def test_options_of_a_wrong_type(fmu_path):
+    for interface in (["CoSimulation"], 2):
+        with pytest.raises(FMUError, match=r"interface .* is not known"):
+            FMU(fmu_path, interface=interface)
+    with pytest.raises(FMUError, match="solver '4' is not known"):
+        ModelExchange(solver=4)
+    with pytest.raises(FMUError, match="None is not the path of an FMU"):
         FMU(None)
+
+
+def test_further_start_values(fmu_path):
+    """A copy with the values of both; the FMU that it comes from keeps its own."""
+    fmu = FMU(fmu_path, start={"k": 2.0, "u": 1.0})
+    more = fmu.with_start({"u": [3.0, 4.0]})
+    assert more.start_values() == {"k": [2.0], "u[1]": [3.0], "u[2]": [4.0]}
+    assert fmu.start_values() == {"k": [2.0], "u[1]": [1.0], "u[2]": [1.0]}
+    with pytest.raises(FMUError, match="has no variable 'w'"):
+        fmu.with_start({"w": 1.0})
 
 
 def copy_without(source, target, keep=lambda name: True, change=lambda name, data: data):
@@ -108,7 +120,7 @@ def test_files_that_are_no_usable_fmu(fmu_path, tmp_path):
     with pytest.raises(FMUError, match=r"FMI version 1\.0"):
         FMU(old)
     other = copy_without(fmu_path, tmp_path / "other.fmu", keep=lambda n: not n.startswith("binaries/"))
-    with pytest.raises(FMUError, match=r"has no binary for .*it has: none"):
+    with pytest.raises(FMUError, match=r"has no binary for .*available: none"):
         FMU(other)
     broken = copy_without(
         fmu_path, tmp_path / "broken.fmu", change=lambda n, d: b"" if n.startswith("binaries/") else d

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import FMU, CosimError, System, read_ssp, simulate
+from cosim import FMU, CosimError, ModelExchange, System, read_ssp, simulate
 from cosim.ssp import read_package
 from tests.cosim.parts import Gain
 from tests.cosim.ssp.packages import (
@@ -177,8 +177,8 @@ def test_the_experiment_and_the_interface(package):
     ends = '<ssd:DefaultExperiment startTime="1" stopTime="3"/>'
     found = read_package(package(system(chosen), ends))
     assert (found.experiment.start, found.experiment.stop, found.experiment.step) == (1.0, 3.0, None)
-    assert found.system.participants["s"].interface == "ModelExchange"
-    with pytest.raises(CosimError, match=r'component g: Gain\.fmu: interface="ModelExchange" is not there'):
+    assert found.system.participants["s"].interface == ModelExchange()
+    with pytest.raises(CosimError, match=r"component g: Gain\.fmu: interface=ModelExchange is not avail"):
         read_ssp(package(system(component("g", "Gain", GAIN, implementation="ModelExchange"))))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim import FMU, Result, Simulation, System, WiringError, read_ssp, simulate
+from cosim import FMU, CoSimulation, Result, Simulation, System, WiringError, read_ssp, simulate
 from fmus.packaging.ssp import export_ssp
 from tests.cosim.fmi.metronome import metronome
 from tests.cosim.fmi.probe import probe
@@ -36,7 +36,9 @@ def chain(path, **options):
 @pytest.mark.parametrize("event_mode", [False, True])
 def test_texts_go_from_fmu_to_fmu(path, event_mode):
     """What is got at t_k is set before the step from t_k, and so seen at t_{k+1}, as a float is."""
-    result = simulate(chain(path, event_mode=event_mode), step=H, stop=3 * H, record=[*RECORD, "a.x"])
+    result = simulate(
+        chain(path, interface=CoSimulation(event_mode)), step=H, stop=3 * H, record=[*RECORD, "a.x"]
+    )
     assert result.texts["a.echo"] == ["Grüße!"] * 4
     assert result.texts["b.echo"] == ["a!"] + ["Grüße!!"] * 3
     assert result.texts["c.echo"] == ["a!", "a!!"] + ["Grüße!!!"] * 2
@@ -58,7 +60,9 @@ def test_texts_of_blocks_count_at_once(path):
 
 def test_a_text_that_stays_is_set_once(path):
     """Every change is an event of an FMU with event mode, of which it counts the entries."""
-    system = System({"a": FMU(path), "b": FMU(path, event_mode=True, start={"beat": 0.0, "rate": 1e-9})})
+    system = System(
+        {"a": FMU(path), "b": FMU(path, interface=CoSimulation(True), start={"beat": 0.0, "rate": 1e-9})}
+    )
     system.connect("a.echo", "b.word")
     result = simulate(system, step=H, stop=8 * H, record=["b.entries"])
     assert list(result["b.entries"]) == [0.0] + [1.0] * 8

@@ -11,7 +11,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cosim import FMU, Block, CosimError, Input, Output, System, WiringError, read_ssp, simulate
+from cosim import (
+    FMU,
+    Block,
+    CosimError,
+    Input,
+    ModelExchange,
+    Output,
+    System,
+    WiringError,
+    read_ssp,
+    simulate,
+)
 from cosim.ssp.format import NAMESPACES, SSPError
 from cosim.ssp.reader import Experiment, read_package
 from fmus.export import export
@@ -110,14 +121,14 @@ def test_the_parameters_of_a_python_participant_are_in_its_set(tmp_path):
 
 def test_how_fmus_and_the_system_are_run_is_kept(tmp_path):
     fmu = export(Frame(), tmp_path / "frame.fmu")
-    given = FMU(fmu, interface="ModelExchange", solver="ode2", substeps=3)
-    stiff = FMU(fmu, interface="ModelExchange", solver="cvode", tolerance=1e-9)
+    given = FMU(fmu, interface=ModelExchange("ode2", substeps=3))
+    stiff = FMU(fmu, interface=ModelExchange("cvode", tolerance=1e-9))
     system = System({"a": given, "b": stiff, "c": FMU(fmu, interface="CoSimulation", isolated=True)})
     path = export_ssp(system, tmp_path / "me.ssp", step=H, stop=STOP, coupling="continuous", solver="ode4")
     validated(path)
     package = read_package(path)
     assert package.experiment == Experiment(0.0, STOP, H, "continuous", "ode4")
-    for name in ("interface", "solver", "substeps", "tolerance", "isolated", "as_block", "event_mode"):
+    for name in ("interface", "isolated", "as_block", "event_mode"):
         for key, member in system.participants.items():
             assert getattr(package.system.participants[key], name) == getattr(member, name), (key, name)
 

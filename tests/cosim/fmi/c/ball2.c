@@ -4,8 +4,8 @@
      q' = level                    level = 1 until the time event at first_at, then -1, 1, -1, ... every period
      gusts                         counts how often the input gust passed 0.5, upwards
 
-   The simulation is asked to end at bounce number end_at_bounce. Derivatives are not to be had for
-   h < -hole (fmi2Discard), and fail for v < -fails_at. */
+   The simulation is asked to end at bounce number end_at_bounce. Derivatives are discarded for h < -hole
+   (fmi2Discard), and fail for v < -fails_at. */
 
 #include <stdbool.h>
 #include <stdlib.h>

@@ -1,9 +1,10 @@
 /* An FMI 2.0 FMU that fails on demand: x' = u, y = 2 x; Co-Simulation and Model Exchange.
 
-   The GUID of its model description says how: "FUNCTION WAY TIME", such as "DoStep null 0.5", makes
-   fmi2DoStep write to address 0 when the time it was told is 0.5 or later. Before that it logs a line.
+   The GUID of its model description selects the fault: "FUNCTION WAY TIME", such as "DoStep null 0.5",
+   makes fmi2DoStep write to address 0 when its time is 0.5 or later. Before that it logs a line.
+   "none choosy 0" refuses the value 3, and "none negative 0" answers a set with the status -1.
    "FUNCTION fatal TIME" answers fmi2Fatal, and crashes when it is called once more to be freed.
-   "none choosy 0" refuses the value 3. "hang" makes the file that CRASH_HANGS names, then hangs.
+   "hang" makes the file that CRASH_HANGS names, then hangs.
    With CRASH_AT_LOAD in the environment, the library aborts when it is loaded. */
 
 #include <stdio.h>
@@ -87,12 +88,13 @@ EXPORT fmi2Status fmi2GetReal(P, const unsigned vr[], size_t n, double value[]) 
 EXPORT fmi2Status fmi2SetReal(P, const unsigned vr[], size_t n, const double value[]) {
     FAIL(SetReal);
     if (strcmp(p->way, "refuse") == 0 && p->time >= p->at) return fmi2Error;
+    if (strcmp(p->way, "negative") == 0) return -1;
     if (strcmp(p->way, "choosy") == 0 && value[0] == 3) return fmi2Error;
     for (size_t i = 0; i < n; i++) *(vr[i] == 0 ? &p->u : &p->x) = value[i];
     return fmi2OK;
 }
 
-/* A string that comes out: what was set, twice. */
+/* A string that comes out: the last one that was set, twice. */
 EXPORT fmi2Status fmi2SetString(P, const unsigned vr[], size_t n, const fmi2String value[]) {
     snprintf(p->said, sizeof p->said, "%s%s", value[0], value[n - 1]);
     return fmi2OK;
@@ -150,7 +152,7 @@ EXPORT fmi2Status fmi2GetNominalsOfContinuousStates(P, double x[], size_t n) {
 EXPORT fmi2Status fmi2GetBooleanStatus(P, fmi2StatusKind kind, fmi2Boolean *value) { return fmi2Error; }
 EXPORT fmi2Status fmi2GetRealStatus(P, fmi2StatusKind kind, double *value) { return fmi2Error; }
 
-/* The bytes of a state have an address in them: they serve in the process that they come from. */
+/* The bytes of a state contain an address, so they are valid in their own process only. */
 EXPORT fmi2Status fmi2GetFMUstate(P, fmi2FMUstate *state) {
     struct plant *copy = malloc(sizeof *copy), **kept = malloc(sizeof *kept);
     *copy = *p;
@@ -165,7 +167,7 @@ EXPORT fmi2Status fmi2SetFMUstate(P, fmi2FMUstate state) {
     p->x = copy->x;
     return fmi2OK;
 }
-EXPORT fmi2Status fmi2FreeFMUstate(P, fmi2FMUstate *state) { /* what it points to stays */
+EXPORT fmi2Status fmi2FreeFMUstate(P, fmi2FMUstate *state) { /* the copy behind it stays */
     free(*state);
     *state = NULL;
     return fmi2OK;

@@ -1,5 +1,5 @@
 /* y[i] = 2 u[i] for any number of inputs and outputs: value references 2 i and 2 i + 1 (FMI 2.0, Co-Simulation).
-   An output is what the input was at the last step. */
+   An output shows the input of the last step. */
 
 #include <stdlib.h>
 

@@ -1,4 +1,4 @@
-/* An FMI 3.0 FMU for Co-Simulation with event mode, clocks and text; strict about what may be called when.
+/* An FMI 3.0 FMU for Co-Simulation with event mode, clocks and text; strict about the order of calls.
 
      x' = rate; where x comes to 1 it goes back to 0 (a state event): wraps counts, the clock wrap ticks
      beats counts time events, one at every multiple of beat (none if it is 0)
@@ -8,7 +8,7 @@
 
    Event mode used: the events are handled there, at their instant if early return is allowed, else at the
    end of the step; without, inside the step. Discrete inputs are set in event mode only, clocked variables
-   while their clock is active. From the time `stuck` on doStep returns early without getting on. An event
+   while their clock is active. From the time `stuck` on doStep returns early without progress. An event
    with a negative rate asks to end the simulation. */
 
 #include <math.h>

@@ -8,6 +8,7 @@ import re
 import stat
 import struct
 import threading
+import tracemalloc
 import warnings
 import zipfile
 from pathlib import Path
@@ -68,10 +69,10 @@ def tmp(tmp_path, monkeypatch):
     [
         ("../evil", "leads out of the folder"),
         ("resources/../../evil", "leads out of the folder"),
-        ("/etc/evil", "is no path inside the FMU"),
-        ("C:/evil", "is no path inside the FMU"),
-        ("C:evil", "is no path inside the FMU"),
-        ("resources\\..\\..\\evil", "is no path inside the FMU"),
+        ("/etc/evil", "is not a path inside the FMU"),
+        ("C:/evil", "is not a path inside the FMU"),
+        ("C:evil", "is not a path inside the FMU"),
+        ("resources\\..\\..\\evil", "is not a path inside the FMU"),
         ("x/" * 2000 + "y", "is a path of 4,001 characters, more than 1,024"),
         (special("resources/link", stat.S_IFLNK | 0o777), "is a link or a device"),
         (special("resources/pipe", stat.S_IFIFO | 0o666), "is a link or a device"),
@@ -93,7 +94,7 @@ def test_a_path_that_zipfile_does_not_write(tmp_path, tmp, name):
         at = content.rfind(b"PK\x01\x02")
         content = content[: at + 28] + struct.pack("<HH", 0, 3) + content[at + 32 :]
     (tmp_path / "name.fmu").write_bytes(content)
-    refused(tmp_path / "name.fmu", "is no path inside the FMU")
+    refused(tmp_path / "name.fmu", "is not a path inside the FMU")
 
 
 def test_a_file_that_is_a_folder_too(tmp_path, tmp):
@@ -155,7 +156,7 @@ def declare(path: Path, name: str, size: int) -> None:
 
 
 def test_a_bomb_by_ratio(tmp_path, tmp, monkeypatch):
-    """32 MB of zeros in 33 kB: refused by what its directory declares; below HARMLESS it is unpacked."""
+    """32 MB of zeros in 33 kB: refused by its declared size; below HARMLESS it is unpacked."""
     more = [("resources/zeros", bytes(2**25))]
     path = write(tmp_path / "bomb.fmu", more=more, compression=zipfile.ZIP_DEFLATED)
     assert FMU(path)
@@ -168,6 +169,18 @@ def test_a_bomb_that_declares_little(tmp_path, tmp):
     path = write(tmp_path / "liar.fmu", more=[("zeros", bytes(2**20))], compression=zipfile.ZIP_DEFLATED)
     declare(path, "zeros", 10)
     refused(path, "'zeros' cannot be unpacked: Bad CRC-32")
+
+
+def test_a_model_description_that_declares_little(tmp_path, tmp):
+    """256 MB of blanks in 260 KB, declared as 100 bytes, are not inflated to find that out."""
+    path = write(tmp_path / "bomb.fmu", text=b" " * (256 << 20), compression=zipfile.ZIP_DEFLATED)
+    declare(path, "modelDescription.xml", 100)
+    tracemalloc.start()
+    try:
+        refused(path, "'modelDescription.xml' cannot be unpacked: Bad CRC-32")
+        assert tracemalloc.get_traced_memory()[1] < 10 << 20  # the archive itself, and the imports of FMPy
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_bomb_of_overlapping_files(tmp_path, tmp):
@@ -188,7 +201,7 @@ def test_an_archive_of_too_many_entries(tmp_path, tmp, monkeypatch):
     """By count, and by the size of the directory before it is read."""
     path = write(tmp_path / "many.fmu", more=[(f"r/{i}", b"") for i in range(50)])
     monkeypatch.setattr(archive, "MAX_ENTRIES", 50)
-    refused(path, "has 52 entries, which no FMU has")
+    refused(path, "has 52 entries, too many for an FMU")
     monkeypatch.setattr(archive, "MAX_DIRECTORY", 1000)
     refused(path, "has a directory of .* too many entries for an FMU")
     large = zipfile.ZipFile(tmp_path / "large.fmu", "w")
@@ -239,7 +252,7 @@ def test_entities(tmp_path, tmp, doctype, use, encoding):
     text = description2(False).replace('modelName="probe"', f'modelName="{use}"')
     text = text.replace("<fmiModel", doctype + "<fmiModel", 1).replace("UTF-8", encoding)
     path = write(tmp_path / "entities.fmu", text=text.encode(encoding))
-    refused(path, "has a DOCTYPE, which FMI does not have|modelDescription.xml is broken: .*entit")
+    refused(path, "has a DOCTYPE, which FMI does not use|modelDescription.xml is broken: .*entit")
 
 
 @pytest.mark.parametrize(
@@ -250,18 +263,18 @@ def test_entities(tmp_path, tmp, doctype, use, encoding):
         (lambda t: t.replace("UTF-8", "EBCDIC-99"), "is broken: .*encoding"),
         (lambda t: t[: len(t) // 2], "is broken"),
         (lambda t: "", "is broken"),
-        (lambda t: "<html/>", "describes no FMU but 'html'"),
+        (lambda t: "<html/>", "must describe an FMU, and its root is 'html'"),
         (lambda t: t.replace('"2.0"', '"1.0"', 2), "FMI version 1.0; FMI 2.0 and 3.0 are supported"),
         (lambda t: t.replace(' valueReference="3"', ""), "'valueReference' is required but missing"),
         (lambda t: t.replace('Reference="3"', 'Reference="1"').replace("<Integer start", "<Real start"),
          "inputs r_in and i_in have the same value reference 1"),
         (lambda t: t.replace('name="i_in"', 'name="r_in"'), "name \"r_in\" .* is not unique"),
-        (lambda t: t.replace('index="2"', 'index="0"'), "by its number, and there are 1 to"),
-        (lambda t: t.replace('index="2"', 'index="99"'), "makes no sense to FMPy .IndexError"),
+        (lambda t: t.replace('index="2"', 'index="0"'), "by its number, which must be from 1 to"),
+        (lambda t: t.replace('index="2"', 'index="99"'), "FMPy cannot interpret it .IndexError"),
         (lambda t: t.replace('dependencies="1"', 'dependencies="0"'), "refers to a variable by its number"),
-        (lambda t: t.replace('fier="probe"', 'fier="../../probe"'), "is a path, and must be a file's"),
+        (lambda t: t.replace('fier="probe"', 'fier="../../probe"'), "is a path; it must be the name"),
         (lambda t: t.replace('fier="probe"', 'fier="prob"'), r"has no library binaries/.*/prob\."),
-        (lambda t: t.replace('"0.5" unit="N"', '"0.5" displayUnit="kN"'), "makes no sense to FMPy .KeyError"),
+        (lambda t: t.replace('"0.5" unit="N"', '"0.5" displayUnit="kN"'), "cannot interpret it .KeyError"),
         (lambda t: t.replace('"0.5" unit="N"', '"0.5" unit="kN"'), "unit \"kN\" .* is not defined"),
     ],
 )  # fmt: skip
@@ -333,7 +346,7 @@ def test_a_binary_that_is_no_library(tmp_path, version):
     wrong = {
         b"": "cannot be loaded",
         b"#!/bin/sh\necho no library\n": "cannot be loaded",
-        **{whole[:n]: "cannot be loaded|is cut off at" for n in (4, 63, 64, 200, 700, 4096)},
+        **{whole[:n]: "cannot be loaded|is truncated at" for n in (4, 63, 64, 200, 700, 4096)},
     }
     for content, words in wrong.items():
         path = changed(
@@ -363,7 +376,7 @@ def test_binaries_for_another_platform(tmp_path, version):
     with zipfile.ZipFile(path, "w") as written:
         written.writestr("modelDescription.xml", (description2 if version == "2.0" else description3)(False))
         written.writestr("binaries/win64/probe.dll", b"MZ")
-    refused(path, r"has no binary for \S+ \(it has: win64\)")
+    refused(path, r"has no binary for \S+ \(available: win64\)")
 
 
 # ---------------------------------------------------------------------- shared extraction

@@ -40,7 +40,7 @@ VARIABLES = [
 
 
 def fmu_with_units(path, version):
-    """Value references are those of probe.h that keep what is set."""
+    """Value references of probe.h that keep their values."""
     rows = ""
     for i, (name, attributes, causality) in enumerate(VARIABLES):
         general = f'name="{name}" valueReference="{46 + i}" causality="{causality}" '
@@ -99,7 +99,7 @@ def test_inverse_display_units(tmp_path):
     path = fmu_with_units(tmp_path / "u.fmu", "3.0")
     assert validate_fmu(str(path)) == []
     assert FMU(path, start={"period": "1200 rpm"}).start_values()["period"] == [60.0 / 1200.0]
-    with pytest.raises(FMUError, match="rpm is the inverse of s times 60, and no value is shown so"):
+    with pytest.raises(FMUError, match="rpm is the inverse of s times 60, which no value can be"):
         FMU(path, start={"period": "0 rpm"})
 
 
@@ -108,8 +108,8 @@ def test_inverse_display_units(tmp_path):
     [
         ({"angle": "3 m"}, r"'m' .* is not convertible to 'rad' .* \(display units of the FMU: deg\)"),
         ({"angle": "3 foo"}, "unit 'foo' is not known"),
-        ({"angle": "thirty deg"}, "'thirty deg' is no number with a unit"),
-        ({"angle": "30"}, "a number alone is given as such"),
+        ({"angle": "thirty deg"}, "'thirty deg' must be a number with a unit"),
+        ({"angle": "30"}, "give others as floats"),
         ({"plain": "3 m"}, "the variable has no unit; give the number alone"),
     ],
 )
@@ -121,7 +121,7 @@ def test_texts_that_are_refused(path, start, words):
 @settings(max_examples=200, deadline=None)
 @given(st.floats(-1e12, 1e12), st.sampled_from(["deg", " deg ", "rad", "\tmrad"]))
 def test_any_number_is_read(number, unit):
-    """repr of a float is read back, with any unit after it, and nothing that is no float is."""
+    """repr of a float is read back, with any unit after it; other texts are refused."""
     units = [
         SimpleNamespace(name="rad", baseUnit=None, displayUnits=[DisplayUnit("deg", factor=180.0 / math.pi)])
     ]

@@ -28,7 +28,7 @@ EXAMPLES = 550  # of each of the four kinds: 2,200 in all
 
 
 class Pair(LinearContinuous):
-    """Arrays, units and a feedthrough, so that every element of a model description is there."""
+    """Arrays, units and a feedthrough, so that every element of a model description occurs."""
 
     u = Input("force", unit="N", shape=2)
     x = State([0.5, -0.2], "state", shape=2)

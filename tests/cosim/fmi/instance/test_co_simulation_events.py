@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from cosim import FMU, Block, FMUError, Output, SimulationError, System, simulate
+from cosim import FMU, Block, CoSimulation, FMUError, Output, SimulationError, System, simulate
 from tests.cosim.fmi.metronome import metronome
 
 H = 5 / 16
@@ -31,7 +31,7 @@ def test_the_fmu_is_valid(path, tmp_path):
 def test_events_inside_steps(tmp_path, early_return, event_mode):
     """x = t mod 1, however its events are handled: in the step, at their instant, at the end of the step."""
     path = metronome(tmp_path / "m.fmu", early_return=early_return)
-    fmu = FMU(path, event_mode=event_mode)
+    fmu = FMU(path, interface=CoSimulation(event_mode))
     result = simulate(System({"m": fmu}), step=H, stop=32 * H)
     t = K * H
     assert list(result["m.x"]) == list(t % 1.0)
@@ -60,7 +60,7 @@ class Doubling(Block):
 @pytest.mark.parametrize("as_block", [False, True])
 def test_discrete_inputs_are_set_when_they_change(path, event_mode, as_block):
     """The FMU refuses them in step mode, when it has an event mode; a block steps before it is read."""
-    fmu = FMU(path, event_mode=event_mode, as_block=as_block)
+    fmu = FMU(path, interface=CoSimulation(event_mode), as_block=as_block)
     result = simulate(System({"d": Doubling(), "m": fmu}, [("d.rate", "m.rate")]), step=H, stop=32 * H)
     t = K * H + (H if as_block else 0.0)
     moved = np.where(t < 2.5, t, 2.5 + 2.0 * (t - 2.5))
@@ -73,7 +73,7 @@ def test_a_step_over_several_events(path, tmp_path):
     for early_return in (True, False):
         fmu = FMU(
             metronome(tmp_path / "m.fmu", early_return=early_return),
-            event_mode=True,
+            interface=CoSimulation(event_mode=True),
             start={"rate": 4.0, "beat": 0.0},
         )
         result = simulate(System({"m": fmu}), step=1.125, stop=9.0)
@@ -86,7 +86,7 @@ def test_a_step_over_several_events(path, tmp_path):
 
 def test_steps_that_are_no_binary_fraction(path):
     """Time events at 0.9 j fall on the points t_3j = 0.3 k to rounding, before or after: each is met."""
-    fmu = FMU(path, event_mode=True, start={"beat": 0.9, "rate": 1e-9})
+    fmu = FMU(path, interface=CoSimulation(event_mode=True), start={"beat": 0.9, "rate": 1e-9})
     result = simulate(System({"m": fmu}), step=0.3, stop=300.0)
     k = np.arange(1001)
     assert (0.3 * k[::3] < 0.9 * (k[::3] // 3)).sum() > 50  # the points that are before
@@ -95,8 +95,8 @@ def test_steps_that_are_no_binary_fraction(path):
 
 def test_a_step_that_does_not_get_on(path):
     for event_mode in (True, False):
-        fmu = FMU(path, event_mode=event_mode, start={"stuck": 1.0})
-        words = r"m failed .*: m returns early from its step at t = 1 s without getting on"
+        fmu = FMU(path, interface=CoSimulation(event_mode), start={"stuck": 1.0})
+        words = r"m failed .*: m returns early from its step at t = 1 s without making progress"
         with pytest.raises(SimulationError, match=words) as caught:
             simulate(System({"m": fmu}), step=0.25, stop=9.0)
         assert list(caught.value.result.time) == [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -105,13 +105,13 @@ def test_a_step_that_does_not_get_on(path):
 def test_event_mode_has_to_be_there(tmp_path):
     path = metronome(tmp_path / "m.fmu", event_mode=False)
     with pytest.raises(
-        FMUError, match=r"m\.fmu has no event mode in Co-Simulation, which event_mode=True asks"
+        FMUError, match=r"m\.fmu has no event mode in Co-Simulation, which event_mode=True requires"
     ):
-        FMU(path, event_mode=True)
+        FMU(path, interface=CoSimulation(event_mode=True))
     assert not FMU(path).event_mode
     path = metronome(tmp_path / "c.fmu", event_mode=False, clocks=True)
     with pytest.raises(FMUError, match="no event mode in Co-Simulation, which its clock wrap needs"):
         FMU(path)
     path = metronome(tmp_path / "c.fmu", clocks=True)
     with pytest.raises(FMUError, match="event_mode=False, but its clock wrap needs event mode"):
-        FMU(path, event_mode=False)
+        FMU(path, interface=CoSimulation(event_mode=False))

@@ -12,6 +12,7 @@ from cosim import (
     Continuous,
     FMUError,
     Input,
+    ModelExchange,
     Parameter,
     Simulation,
     SimulationEndedWarning,
@@ -67,8 +68,8 @@ def plants(tmp_path_factory):
     return {plant: export(plant(), folder / f"{plant.__name__}.fmu") for plant in classes}
 
 
-def exchanged(path, **options) -> FMU:
-    return FMU(path, interface="ModelExchange", **options)
+def exchanged(path, start=None, **options) -> FMU:
+    return FMU(path, interface=ModelExchange(**options), start=start)
 
 
 # ------------------------------------------------------------------------------- solvers
@@ -76,7 +77,7 @@ def exchanged(path, **options) -> FMU:
 
 @pytest.mark.parametrize(("solver", "order"), [(s, i + 1) for i, s in enumerate(FIXED)])
 def test_order_of_convergence(plants, solver, order):
-    """The slope of log(error) over log(h) is the order; 0.2 is what the next order leaves at these steps."""
+    """The slope of log(error) over log(h) is the order; the next order changes it by 0.2 at these steps."""
     steps, errors = np.array([10, 20, 40]), []
     for n in steps:
         fmu = exchanged(plants[Pole], solver=solver)
@@ -152,7 +153,7 @@ def test_a_run_can_be_repeated(path):
 @pytest.mark.parametrize("solver", ["ode2", "cvode"])
 def test_a_run_can_be_rolled_back(path, solver):
     """Before a bounce and a time event, and over them again, twice: the same bits."""
-    fmu = FMU(path, solver=solver, start={"first_at": 1.37})
+    fmu = exchanged(path, solver=solver, start={"first_at": 1.37})
     with Simulation(System({"b": fmu}), step=0.1) as simulation:
         simulation.run(1.3)
         there = simulation.snapshot()
@@ -182,7 +183,7 @@ def test_a_bouncing_ball_against_its_closed_form(path):
     with pytest.warns(
         LateEventWarning, match=r"b has a state event in the step to t = .*, which is handled at its"
     ):
-        late = simulate(System({"b": FMU(path, solver="ode4")}), step=0.03, stop=3.0)
+        late = simulate(System({"b": exchanged(path, solver="ode4")}), step=0.03, stop=3.0)
     assert np.abs(late["b.h"] - wanted[: len(late.time)]).max() > 1e-2
 
 
@@ -190,7 +191,7 @@ def test_a_bouncing_ball_against_its_closed_form(path):
 @pytest.mark.parametrize(("first", "period"), [(0.37, 0.25), (0.05, 0.01), (0.3, 0.1)])
 def test_time_events_are_met_exactly(path, solver, first, period):
     """q' = 1, -1, 1, ...: every method is exact between the events, and off by h if it runs over one."""
-    fmu = FMU(path, solver=solver, start={"first_at": first, "period": period, "g": 0.0})
+    fmu = exchanged(path, solver=solver, start={"first_at": first, "period": period, "g": 0.0})
     result = simulate(System({"b": fmu}), step=0.1, stop=2.0)
     events = first + period * np.arange(1000)
     knots = np.concatenate([[0.0], events])
@@ -209,13 +210,13 @@ def test_time_events_are_met_exactly(path, solver, first, period):
     ],
 )
 def test_time_events_of_an_fmu_without_states(tmp_path, solver, coupling, step):
-    """The FMU refuses an event that is off by a rounding, and every function that it has no states for.
+    """The FMU refuses an event that is off by a rounding, and every function of states, of which it has none.
 
     Its events are at sums of 0.1, the communication points at products: they differ from k = 6 on.
     """
     path = counter(tmp_path / "counter.fmu")
     assert validate_fmu(str(path)) == []
-    fmu = FMU(path, start={"last": 57}, solver=solver)
+    fmu = exchanged(path, start={"last": 57}, solver=solver)
     with pytest.warns(SimulationEndedWarning, match=r"c asked to end the simulation at t = 5\.7 s"):
         result = simulate(System({"c": fmu}), step=step, stop=6.0, coupling=coupling)
     assert list(result["c.count"]) == list(np.floor(10.0 * result.time + 1e-9))
@@ -239,7 +240,7 @@ def test_an_input_that_jumps_over_an_indicator_is_an_event_at_once(path):
 )
 def test_a_request_to_end_in_an_event(path, solver, coupling, last, when):
     """A bounce at sqrt(2) s: cvode leaves the step there, fixed steps find it at the end of theirs."""
-    fmu = FMU(path, start={"end_at_bounce": 1}, solver=solver)
+    fmu = exchanged(path, start={"end_at_bounce": 1}, solver=solver)
     with pytest.warns(SimulationEndedWarning, match=rf"b asked to end the simulation at t = {when} s"):
         result = simulate(System({"b": fmu}), step=0.25, stop=5.0, coupling=coupling)
     assert result.time[-1] == last
@@ -259,7 +260,7 @@ def test_what_the_schedule_says(path):
     cvode = "  b: cvode, tolerance 1e-06, from event to event (FMU, Python callback)"
     assert cvode in schedule(System({"b": FMU(path)}), step=0.1).splitlines()
     fixed = "  b: ode2, 3 substeps, split at time events (FMU)"
-    assert fixed in schedule(System({"b": FMU(path, solver="ode2", substeps=3)}), step=0.1).splitlines()
+    assert fixed in schedule(System({"b": exchanged(path, solver="ode2", substeps=3)}), step=0.1).splitlines()
 
 
 # -------------------------------------------------------------------------------- errors
@@ -267,55 +268,40 @@ def test_what_the_schedule_says(path):
 
 @pytest.mark.parametrize("solver", ["ode3", "cvode"])
 def test_an_fmu_that_fails_in_a_step(path, solver):
-    fmu = FMU(path, solver=solver, start={"fails_at": 0.55})
+    fmu = exchanged(path, solver=solver, start={"fails_at": 0.55})
     with pytest.raises(SimulationError, match=r"b failed.* at t = 0\.5\d* s with fmi2Error") as caught:
         simulate(System({"b": fmu}), step=0.1, stop=1.0)
     assert len(caught.value.result.time) == 6
 
 
-def test_derivatives_that_are_not_to_be_had(path):
-    """cvode tries smaller steps; there is no bounce above the hole, so it cannot go on."""
+def test_derivatives_that_are_discarded(path):
+    """cvode tries smaller steps; there is no bounce above the hole, so it fails."""
     start = {"hole": -0.5}
-    with pytest.raises(SimulationError, match=r"b does not come beyond t = 0\.9999\d* s"):
+    with pytest.raises(SimulationError, match=r"b does not get past t = 0\.9999\d* s"):
         simulate(System({"b": FMU(path, start=start)}), step=0.1, stop=2.0)
     with pytest.raises(SimulationError, match=r"b failed at t = .* with fmi2Discard"):
-        simulate(System({"b": FMU(path, start=start, solver="ode4")}), step=0.1, stop=2.0)
+        simulate(System({"b": exchanged(path, start=start, solver="ode4")}), step=0.1, stop=2.0)
 
 
 def test_events_without_end_are_an_error(path):
-    with pytest.raises(SimulationError, match=r"b does not come beyond t = 0\.05\d* s .*events accumulate"):
+    with pytest.raises(SimulationError, match=r"b does not get past t = 0\.05\d* s .*events accumulate"):
         simulate(System({"b": FMU(path, start={"first_at": 0.05, "period": 1e-15})}), step=0.1, stop=0.1)
 
 
-def test_options_that_make_no_sense(path, plants):
+def test_interfaces_that_an_fmu_does_not_support(path, plants):
     both = plants[Pole]
     for where, options, words in [
-        (path, {"solver": "cvod"}, "solver 'cvod' is not known; did you mean 'cvode'"),
         (both, {"interface": "modelexchange"}, "did you mean 'ModelExchange'"),
-        (
-            path,
-            {"interface": "CoSimulation"},
-            'interface="CoSimulation" is not there, the FMU has ModelExchange',
-        ),
-        (both, {"solver": "ode2"}, 'solver is of Model Exchange, .* say interface="ModelExchange" as well'),
-        (both, {"substeps": 2}, "substeps is of Model Exchange"),
-        (both, {"tolerance": 1e-3}, "tolerance is of Model Exchange"),
-        (path, {"substeps": 2}, "not of cvode, which an FMU with event indicators has unless solver="),
-        (path, {"solver": "ode4", "tolerance": 1e-3}, 'tolerance is of solver="cvode", and ode4 has fixed'),
-        (path, {"tolerance": 0.0}, r"tolerance=0\.0 is no number from 1e-14 to 1"),
-        (path, {"solver": "ode4", "substeps": 0}, "substeps=0 is no whole number"),
-        (both, {"interface": "ModelExchange", "as_block": True}, 'interface="ModelExchange" is given'),
-        (
-            both,
-            {"interface": "ModelExchange", "event_mode": True},
-            "event_mode is of Co-Simulation, and Model",
-        ),
+        (path, {"interface": "CoSimulation"}, "interface=CoSimulation is not available, the FMU has ModelE"),
+        (path, {"interface": ModelExchange(substeps=2)}, r"ball\.fmu, whose event indicators need cvode"),
+        (both, {"interface": ModelExchange(tolerance=1e-3)}, "tolerance belongs to"),
+        (both, {"interface": "ModelExchange", "as_block": True}, "interface=ModelExchange is given"),
     ]:
         with pytest.raises(FMUError, match=words):
             FMU(where, **options)
     for options, words in [
         ({"interface": "CoSimulation"}, "stage coupling needs Model Exchange; leave interface away"),
-        ({"interface": "ModelExchange", "solver": "ode4"}, "leave solver and substeps of the FMU away"),
+        ({"interface": ModelExchange("ode4")}, "leave the options of ModelExchange away"),
     ]:
         with pytest.raises(WiringError, match=words):
             simulate(System({"p": FMU(both, **options)}), step=0.1, stop=0.1, coupling="continuous")

@@ -1,4 +1,4 @@
-"""FMUs in processes of their own: the same bits, and crashes that end the run and nothing else."""
+"""FMUs in processes of their own: the same bits, and crashes that end only the run."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from cosim import FMU, Block, FMUError, Output, Simulation, SimulationError, SnapshotError, System, simulate
-from cosim.fmi.instance.fmi2 import Fmi2
-from cosim.fmi.instance.fmi3 import Fmi3
+from cosim.fmi.instance.drivers import load
 from cosim.fmi.isolation.isolation import compile_support
 from cosim.loop.signals import RunSignals
 from fmus.export import export
@@ -150,14 +149,14 @@ def test_several_instances_of_what_a_process_can_have_once_only(tmp_path):
 
 
 @contextmanager
-def instance(adapter, fmu):
-    """An instance by itself, to call its functions one by one."""
-    fmi = adapter(fmu, "p", False, RunSignals())
+def instance(fmu):
+    """An isolated instance by itself, to call its functions one by one."""
+    driver = load(fmu, "p", False, RunSignals(), isolated=True)
     try:
-        yield fmi
-        fmi.api.freeInstance()
+        yield driver
+        driver.free()
     finally:
-        fmi.close()
+        driver.close()
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -169,35 +168,33 @@ def test_the_fmu_is_in_the_other_process_only(tmp_path, version):
         return {line.split()[-1] for line in lines if "/probe.so" in line}
 
     before = mapped(os.getpid())  # those of earlier tests
-    with instance(
-        {"2.0": Fmi2, "3.0": Fmi3}[version], FMU(probe(tmp_path / "probe.fmu", version), isolated=True)
-    ):
+    with instance(FMU(probe(tmp_path / "probe.fmu", version))):
         (child,) = children(os.getpid())
         assert mapped(child)
         assert mapped(os.getpid()) <= before
 
 
 def test_strings_and_many_arguments(tmp_path):
-    with instance(Fmi2, crash(tmp_path)) as fmi:
-        fmi.api.setString([0, 1], ["façade", "x" * 30])
-        assert fmi.api.getString([0, 0]) == [("façade" + "x" * 30).encode()] * 2
+    with instance(crash(tmp_path)) as driver:
+        driver.api.setString([0, 1], ["façade", "x" * 30])
+        assert driver.api.getString([0, 0]) == [("façade" + "x" * 30).encode()] * 2
         known, unknown, seed = [4, 5, 6], [1, 2], [0.0, 0.0, 0.25]
-        assert list(fmi.api.getDirectionalDerivative(unknown, known, seed)) == [160.25, 260.25]
+        assert list(driver.api.getDirectionalDerivative(unknown, known, seed)) == [160.25, 260.25]
         with pytest.raises(FMUError, match="the FMU's library has no function fmi2GetInteger"):
-            fmi.attempt("get its values", lambda: fmi.api.getInteger([0]))
+            driver.attempt("get its values", lambda: driver.api.getInteger([0]))
 
 
 def test_binary_data_with_zeros_in_it(tmp_path):
-    with instance(Fmi3, FMU(metronome(tmp_path / "m.fmu"), isolated=True)) as fmi:
+    with instance(FMU(metronome(tmp_path / "m.fmu"), isolated=True)) as driver:
         for word, data in (("", b""), ("ein Wort", b"\0\1\2"), ("ü", b"ab\0")):
-            fmi.api.setString([40], [word])
-            fmi.api.setBinary([42], [data])
-            assert fmi.api.getString([41]) == [word + "!"]
-            assert bytes(fmi.api.getBinary([43])[0]) == data[::-1]
+            driver.api.setString([40], [word])
+            driver.api.setBinary([42], [data])
+            assert driver.api.getString([41]) == [word + "!"]
+            assert bytes(driver.api.getBinary([43])[0]) == data[::-1]
         with pytest.raises(
             FMUError, match="fmi3SetBinary passes more than the 255 MB that an isolated FMU has"
         ):
-            fmi.attempt("set its data", lambda: fmi.api.setBinary([42], [bytes(1 << 28)]))
+            driver.attempt("set its data", lambda: driver.api.setBinary([42], [bytes(1 << 28)]))
 
 
 def test_no_line_of_the_log_is_lost(tmp_path):
@@ -217,9 +214,9 @@ def test_a_failed_set_stops_the_step_that_it_is_sent_with(tmp_path):
 
 def test_a_failed_set_among_more_than_fit_in_a_request_is_reported(tmp_path):
     """The 3rd of 40 sets of the loop fails; requests have 16 calls, and none of these has an answer."""
-    with instance(Fmi2, crash(tmp_path, "none choosy 0")) as fmi:
-        set_real, get_real = fmi.api.dll.loop_fmi2SetReal, fmi.api.dll.loop_fmi2GetReal
-        component, x = fmi.api.component, (ctypes.c_uint32 * 1)(1)
+    with instance(crash(tmp_path, "none choosy 0")) as driver:
+        set_real, get_real = driver.api.dll.loop_fmi2SetReal, driver.api.dll.loop_fmi2GetReal
+        component, x = driver.api.component, (ctypes.c_uint32 * 1)(1)
         kinds = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
         set_real.argtypes = get_real.argtypes = kinds
         statuses = [set_real(component, x, 1, (ctypes.c_double * 1)(i)) for i in range(1, 41)]
@@ -231,12 +228,13 @@ def test_a_failed_set_among_more_than_fit_in_a_request_is_reported(tmp_path):
 ODD_CALLS = """
     import ctypes, sys
     from cosim import FMU
+    from cosim.fmi.instance.drivers import load
     from cosim.fmi.isolation.isolation import _LOOK, _support
-    from cosim.loop.signals import Failures
+    from cosim.loop.signals import RunSignals
 
     fmu = FMU(sys.argv[1], isolated=True)
-    fmi = fmu.adapter(fmu, "p", False, Failures())
-    dll, c, vr = fmi.api.dll, fmi.api.component, (ctypes.c_uint32 * 1)(0)
+    driver = load(fmu, "p", False, RunSignals(), isolated=True)
+    dll, c, vr = driver.api.dll, driver.api.component, (ctypes.c_uint32 * 1)(0)
     kinds = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
     dll.loop_fmi2SetReal.argtypes = dll.loop_fmi2GetReal.argtypes = dll.fmi2SetString.argtypes = kinds
     dll.fmi2FreeInstance.argtypes = (ctypes.c_void_p,)
@@ -244,7 +242,7 @@ ODD_CALLS = """
     print(dll.loop_fmi2SetReal(None, vr, 1, vr), dll.loop_fmi2GetReal(None, vr, 1, vr))
     print(dll.fmi2FreeInstance(None), dll.fmi2SetDebugLogging(c, 1, 2, None))
     print(dll.fmi2SetString(c, vr, 1, None), dll.fmi2SetString(c, vr, 1, None))
-    fmi.close()
+    driver.close()
 
     damaged = ctypes.create_string_buffer(1 << 20)
     caller = _support().caller_open(ctypes.addressof(damaged), 1 << 20, _LOOK(lambda *_: 0))

@@ -7,6 +7,7 @@ import pytest
 
 from cosim import (
     FMU,
+    CoSimulation,
     Input,
     LinearContinuous,
     OptionError,
@@ -222,7 +223,7 @@ class Backwards(LinearContinuous):
 
 def test_an_fmu_that_asks_to_end_while_the_start_is_iterated(tmp_path):
     """A negative rate, set as a discrete input, is an event in which the metronome asks to end."""
-    system = System({"m": FMU(metronome(tmp_path / "m.fmu"), event_mode=True), "b": Backwards()})
+    system = System({"m": FMU(metronome(tmp_path / "m.fmu"), interface=CoSimulation(True)), "b": Backwards()})
     system.connect("m.x", "b.u")
     system.connect("b.y", "m.rate")
     with pytest.raises(SimulationError, match=r"m asked to end .* at t = 0 s, which is its start"):
