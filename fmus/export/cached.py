@@ -2,7 +2,7 @@
 
     plant = as_fmu(Oscillator())
 
-The file is keyed by what goes into it: the compiled kernels, the start record, the
+The file is keyed by its contents: the compiled kernels, the start record, the
 declarations (their units and meanings stand in the modelDescription), and the exporter.
 Docstrings and comments of a plant are not part of the key.
 """

@@ -55,7 +55,7 @@ def no_law(s: Any, e: int, h: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-#: what `rebound` replaces in `row_law` and `pair_law`
+#: globals of `row_law` and `pair_law` that `rebound` replaces
 number: int = -1
 law: Any = None
 otherwise: Any = no_law

@@ -101,8 +101,8 @@ def export_container(
 def _with_conversions(system: System) -> tuple[System, list[str]]:
     """Return the system with a block for each conversion and delay, and the blocks in their order."""
     wired = System(dict(system.participants))
-    before: list[str] = []  # of what plants give
-    after: dict[str, list[str]] = {}  # of what blocks give
+    before: list[str] = []  # for outputs of plants
+    after: dict[str, list[str]] = {}  # for outputs of blocks
     for i, c in enumerate(system.connections):
         if (c.scale, c.offset) == (1.0, 0.0) and c.initial is None:
             wired.connect(str(c.source), str(c.target), transformation=(1.0, 0.0))
@@ -285,7 +285,7 @@ def _described(text: bytes, parts: dict[str, Part]) -> bytes:
 
 @contextmanager
 def _errors() -> Iterator[None]:
-    """Keep the toolbox's log quiet, and raise what it logs as an error."""
+    """Keep the toolbox's log quiet, and raise the errors that it logs."""
     logger = logging.getLogger("fmu_manipulation_toolbox")
     found: list[str] = []
 

@@ -18,7 +18,7 @@ from ..export.fmu import export
 
 @dataclass
 class Part:
-    """A participant, its FMU file, and what the file declares."""
+    """A participant, its FMU file, and the declarations of the file."""
 
     name: str
     member: Component

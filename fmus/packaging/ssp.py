@@ -51,7 +51,7 @@ from ..export.fmu import write_archive
 from .parts import Part, fmu_parts
 
 PARAMETER_SET = "parameters"  # one name for all: tools apply sets by name
-#: what ecos and libcosim read
+#: the annotation that ecos and libcosim read
 _OSP = ("com.opensimulationplatform", "http://opensimulationplatform.com/SSP/OSPAnnotations")
 
 
@@ -73,13 +73,13 @@ def export_ssp(
     step, stop, start
         default experiment, in s; a package without one is run with `--step` and `--stop`
     coupling, solver
-        what `simulate` takes, if it is another one than sampled coupling; for our own reader
+        the coupling that `simulate` takes, if it is not sampled coupling; for our own reader
     version
-        "1.0" or "2.0"; None takes 1.0 where it can say what the system is
+        "1.0" or "2.0"; None takes 1.0 where it can express the system
     fmi_version
-        of the FMUs that Python participants become: "2.0", in SSP 2.0 "3.0" by default
+        version of the FMUs of Python participants: by default "2.0", in SSP 2.0 "3.0"
     platforms
-        names of `fmus.link.PLATFORMS` for these FMUs; this machine's by default
+        names in `cosim.codegen.c_compiler.PLATFORMS` for these FMUs; that of this machine by default
     """
     if version is not None and version not in VERSIONS:
         raise SSPError(f"SSP version '{version}' is not supported; choose from {', '.join(VERSIONS)}")
@@ -354,7 +354,7 @@ def _values(part: Part) -> list[tuple[Any, list[Any]]]:
     found = []
     for v in variables.values():
         given = [] if v.causality != "parameter" or v.start is None else [float(x) for x in v.start.split()]
-        if given and np.isfinite(given).all():  # SSV has no place for what is not; the FMU has it
+        if given and np.isfinite(given).all():  # SSV cannot hold other numbers; the FMU has them
             found.append((v, given))
     return found
 

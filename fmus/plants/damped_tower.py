@@ -38,7 +38,7 @@ from ..structures.structure import Structure, modes_of, require_freedoms
 
 
 class DampedTower(Continuous):
-    """Structure with one tuned mass damper at its last DOF; exact for held forces."""
+    """Structure with one tuned mass damper at its last degree of freedom; exact for held forces."""
 
     stiffness = Parameter(1.0, "factor on the stiffness of the structure", unit="1", min=0.01)
     m = Parameter(1.0, "mass of the damper", unit="kg", min=1.0)
@@ -47,9 +47,9 @@ class DampedTower(Continuous):
     omega2 = Parameter(shape="n", meaning="squared frequencies of the structure", unit="1/s^2", fixed=True)
     damping = Parameter(shape="n", meaning="2 zeta omega", unit="1/s", fixed=True)
     shapes = Parameter(shape=("n", "n"), meaning="mass-normalised modes, by column", fixed=True)
-    floors = Parameter(shape="f", meaning="DOF with outputs, counted from 1", fixed=True)
+    floors = Parameter(shape="f", meaning="degrees of freedom with outputs, counted from 1", fixed=True)
 
-    w = Input("forces on the DOF of the structure", shape="n", unit="N")
+    w = Input("forces on the degrees of freedom of the structure", shape="n", unit="N")
     u = Input("force of the actuator on the damper", unit="N")
 
     x = Output("displacements", shape="f", unit="m")

@@ -30,10 +30,12 @@ class ModalStructure(Continuous):
     omega2 = Parameter(shape="n", meaning="squared frequencies", unit="1/s^2", fixed=True)
     damping = Parameter(shape="n", meaning="2 zeta omega", unit="1/s", fixed=True)
     shapes = Parameter(shape=("n", "n"), meaning="mass-normalised modes, by column", fixed=True)
-    shapes_out = Parameter(shape=("n", "f"), meaning="modes at the DOF with outputs, by row", fixed=True)
+    shapes_out = Parameter(
+        shape=("n", "f"), meaning="modes at the degrees of freedom with outputs, by row", fixed=True
+    )
 
-    w = Input("forces on the DOF", shape="n", unit="N")
-    top = Input("further force on the last DOF", unit="N")
+    w = Input("forces on the degrees of freedom", shape="n", unit="N")
+    top = Input("further force on the last degree of freedom", unit="N")
     x = Output("displacements", shape="f", unit="m")
     v = Output("velocities", shape="f", unit="m/s")
     a = Output("accelerations", shape="f", unit="m/s^2")

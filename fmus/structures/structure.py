@@ -49,7 +49,7 @@ class Freedoms(dict[tuple[Node, Direction], int]):
 
 @dataclass(frozen=True)
 class Structure:
-    """M, C, K (n, n) of (1); what is not given of the rest has no rows (influence: no columns)."""
+    """M, C, K (n, n) of (1); rows that are not given are empty (influence: columns)."""
 
     M: Array
     C: Array

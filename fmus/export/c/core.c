@@ -303,7 +303,7 @@ uint32_t core_extent(uint32_t reference, bool whole, const struct variable **var
 }
 
 /* The loop of a master reads and writes elements of zones that are all readable or writable: no search.
-   True when every reference lies below `end`; `*computed`: one of them is no input. */
+   True when every reference lies below `end`; `*computed`: one of them is not an input. */
 static bool all_below(uint32_t end, const uint32_t *references, size_t n, bool *computed) {
     uint32_t largest = 0;
     PLAIN_LOOP

@@ -74,7 +74,7 @@ struct instance {
     double start_time;
     double stop_time;   /* +inf: not defined */
     double step;        /* last communication step, 0: none */
-    bool stale;         /* outputs and derivatives are older than what they depend on */
+    bool stale;         /* outputs and derivatives are out of date */
     double *record;     /* the model's record */
     double *settings;   /* until initialisation ends: the record as set, before `initialize` */
     double *trial;      /* room for directional derivatives */
