@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from cosim import Array, simulate
-from scenarios.chattering import study
+from scenarios.chattering.study import Study
 
 
 def disturbance(case: int) -> Array:
     """Return what is added to x2' at the 4001 points of a run."""
-    system = study.build(case=case)
+    system = Study(case=case).build()
     return simulate(system, step=0.01, stop=40.0, record=["total.y"])["total.y"]
 
 

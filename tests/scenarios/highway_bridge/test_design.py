@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cosim import Result
-from scenarios.highway_bridge import study
 from scenarios.highway_bridge.bridge import SEGMENT, highway_bridge
 from scenarios.highway_bridge.criteria import base_shears
+from scenarios.highway_bridge.study import Study
 
 
 def test_damping_is_5_percent_at_two_frequencies() -> None:
@@ -40,6 +40,5 @@ def test_lqg_uses_the_force_that_its_weight_allows() -> None:
 
     A weight of forces twice as large takes a third off it; the bound is a twentieth.
     """
-    options = {"record": "el-centro", "duration": 8.0, "compare": False}
-    result = study.run(controller="lqg", **options)
+    result = Study(record="el-centro", controller="lqg", duration=8.0, compare=False).run()
     assert np.abs(result["bridge.u"]).max() == pytest.approx(351.0e3, rel=0.05)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenarios.tall_building.criteria import PRINTED
+from scenarios.tall_building.thesis_tables import PRINTED
 
 #: over six columns and three stiffnesses, added when the tables were read
 SUMS = {
