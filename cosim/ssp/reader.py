@@ -47,6 +47,7 @@ from .format import (
     own_annotation,
     parse_xml,
     tag,
+    whole_number,
 )
 from .parameters import Parameters, Value
 from .structure import Element, Link, Node, Structure
@@ -205,7 +206,7 @@ class _Reader:
         options |= {
             n: flag(own[a]) for n, a in (("event_mode", "eventMode"), ("isolated", "isolated")) if a in own
         }
-        options |= {n: _whole(own[n], where) for n in ("substeps", "every") if n in own}
+        options |= {n: whole_number(own[n], where) for n in ("substeps", "every") if n in own}
         for name, attribute in (("tolerance", "tolerance"), ("sample_period", "samplePeriod")):
             if attribute in own:
                 options[name] = number(own[attribute], where)
@@ -326,10 +327,3 @@ class _Reader:
         texts = {"start": found.get("startTime"), "stop": found.get("stopTime"), "step": own.get("step")}
         times = {name: number(text, where) for name, text in texts.items() if text}
         return Experiment(**times, coupling=own.get("coupling"), solver=own.get("solver"))
-
-
-def _whole(text: str, where: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise SSPError(f"{where}: '{text}' must be a whole number") from None

@@ -157,6 +157,10 @@ UNSUITABLE = [
         r"component g: '2\.5' must be a whole number",
     ),
     (
+        system(component("g", "Gain", GAIN, NOTE.format(EVERY.replace("2.5", "")))),
+        r"component g: '' must be one whole number",
+    ),
+    (
         nested(connection("a", "b"), kinds=("a inout", "b inout")),
         r"connection sub\.a - sub\.b: both connectors are of kind inout",
     ),
