@@ -1,4 +1,4 @@
-"""Every error of the reader of SSP that a file can cause: where, what, and what is supported."""
+"""Every error that an SSP file can cause in the reader: it says where, what, and the remedy."""
 
 from __future__ import annotations
 
