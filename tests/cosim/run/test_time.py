@@ -143,7 +143,7 @@ class Chain(Block):
         ({"step": "0.1"}, "no finite number"),
         ({"step": 0.03}, "the time from start to stop of 1 s is 33.3333 communication steps"),
         ({"step": 0.1 + 1e-8}, "must be a whole number of them"),
-        ({"step": 1e-320}, "more than can be counted"),
+        ({"step": 1e-320}, "steps of .* s, which is too many"),
         ({"stop": 0.0}, "is not after start"),
         ({"stop": math.inf}, "no finite number"),
         ({"stop": None}, "stop=None is no finite number"),
