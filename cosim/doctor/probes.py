@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import CosimError, WiringError
 from ..fmi.fmu import FMU
-from ..fmi.ports import FMUPort, unit_of
+from ..fmi.ports import FMUPort, unit_definitions, unit_of
 from ..units import parse
 from .memory import handles, memory
 from .subject import STEPS, Subject, Values, difference, same
@@ -61,7 +61,7 @@ def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     ends = {n: p for n, p in kinds.items() if p.variables[0].causality in ("input", "output")}
     without = [n for n, p in ends.items() if unit_of(p.variables[0]) is None]
     unknown = set()
-    for unit in {p.unit for p in ends.values()} - {None}:
+    for unit in {p.unit for p in ends.values()} - {None} - unit_definitions(fmu.description).keys():
         try:
             parse(str(unit))
         except WiringError:

@@ -100,6 +100,22 @@ def number(text: str, where: str) -> float:
     return found[0]
 
 
+def whole_numbers(text: str, where: str) -> list[int]:
+    """Return the whole numbers of a text."""
+    try:
+        return [int(part) for part in text.split()]
+    except ValueError:
+        raise SSPError(f"{where}: '{text}' must be a whole number") from None
+
+
+def whole_number(text: str, where: str) -> int:
+    """Return one whole number."""
+    found = whole_numbers(text, where)
+    if len(found) != 1:
+        raise SSPError(f"{where}: '{text}' must be one whole number")
+    return found[0]
+
+
 def factor_and_offset(element: etree._Element, where: str) -> tuple[float, float]:
     """Return the attributes of a LinearTransformation or a BaseUnit."""
     return number(element.get("factor", "1"), where), number(element.get("offset", "0"), where)

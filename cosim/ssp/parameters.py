@@ -30,6 +30,7 @@ from .format import (
     numbers,
     parse_xml,
     tag,
+    whole_numbers,
 )
 from .structure import Element, Node
 
@@ -147,10 +148,7 @@ def _value(parameter: etree._Element, units: Units, where: str) -> Value:
     if kind in _REALS:
         values = list(numbers(text, where))
     elif kind in _INTEGERS:
-        try:
-            values = [int(part) for part in text.split()]
-        except ValueError:
-            raise SSPError(f"{where}: '{text}' must be a whole number") from None
+        values = list(whole_numbers(text, where))
     elif kind == "Boolean":
         values = [flag(part) for part in text.split()]
     elif kind in ("String", "Enumeration", "Binary"):

@@ -48,6 +48,7 @@ from .format import (
     own_annotation,
     parse_xml,
     tag,
+    whole_number,
 )
 from .parameters import Parameters, Value
 from .structure import Element, Link, Node, Structure
@@ -203,12 +204,12 @@ class _Reader:
                 str(element.xml.get("source")),
                 None if implementation == "any" else implementation,
                 solver=own.get("solver"),
-                substeps=_whole(own["substeps"], where) if "substeps" in own else None,
+                substeps=whole_number(own["substeps"], where) if "substeps" in own else None,
                 tolerance=number(own["tolerance"], where) if "tolerance" in own else None,
                 event_mode=flag(own["eventMode"]) if "eventMode" in own else None,
             ),
             "as_block": own.get("kind") == "block",
-            "every": _whole(own["every"], where) if "every" in own else None,
+            "every": whole_number(own["every"], where) if "every" in own else None,
             "sample_period": number(own["samplePeriod"], where) if "samplePeriod" in own else None,
             "isolated": "isolated" in own and flag(own["isolated"]),
         }
@@ -328,10 +329,3 @@ class _Reader:
         texts = {"start": found.get("startTime"), "stop": found.get("stopTime"), "step": own.get("step")}
         times = {name: number(text, where) for name, text in texts.items() if text}
         return Experiment(**times, coupling=own.get("coupling"), solver=own.get("solver"))
-
-
-def _whole(text: str, where: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise SSPError(f"{where}: '{text}' must be a whole number") from None

@@ -65,7 +65,7 @@ def test_expm_equals_scipys(seed, n, size):
 def test_expm_of_a_stiff_oscillator_is_its_closed_form():
     """x'' + 2 zeta w x' + w^2 x = 0 over w h = 50: rows that differ by w^2 = 10^6, seven squarings.
 
-    Each squaring may double a relative error of 1e-16 in what is balanced, 2e-14 in all.
+    Each squaring may double a relative error of 1e-16 in the balanced matrix, 2e-14 in all.
     """
     w, zeta, h = 1000.0, 0.01, 0.05
     work = np.zeros((4, 2, 2))
@@ -74,7 +74,7 @@ def test_expm_of_a_stiff_oscillator_is_its_closed_form():
     d = w * np.sqrt(1.0 - zeta**2)
     c, s, decay = np.cos(d * h), np.sin(d * h), np.exp(-zeta * w * h)
     wanted = decay * np.array([[c + zeta * w / d * s, s / d], [-w * w / d * s, c - zeta * w / d * s]])
-    scale = np.array([[1.0, 1.0 / w], [w, 1.0]])  # what the entries are measured against
+    scale = np.array([[1.0, 1.0 / w], [w, 1.0]])  # the scale of the entries
     assert (np.abs(work[0] - wanted) / scale).max() <= 2e-14
 
 

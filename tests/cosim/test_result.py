@@ -1,4 +1,4 @@
-"""Results: what is recorded, statistics, files."""
+"""Results: recorded signals, statistics, files."""
 
 from __future__ import annotations
 

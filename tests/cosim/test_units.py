@@ -93,6 +93,18 @@ def test_a_factor_that_no_float_holds_is_refused():
 
 
 @pytest.mark.parametrize(
+    ("unit", "words"),
+    [
+        ("bit", "unit 'bit' is made of 'bit', for which FMI has no base unit"),
+        ("m^0.5", r"unit 'm\^0\.5' has the power 0\.5 of meter; FMI has whole powers only"),
+    ],
+)
+def test_units_that_have_no_definition_in_fmi(unit, words):
+    with pytest.raises(WiringError, match=words):
+        definition(unit)
+
+
+@pytest.mark.parametrize(
     ("source", "given_source", "target", "given_target", "wanted"),
     [
         ("force_unit", Definition(FORCE), "N", None, (1.0, 0.0)),

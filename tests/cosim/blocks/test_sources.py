@@ -59,7 +59,7 @@ def test_zero_outside():
 
 
 def test_scale_and_stage_times():
-    """Under stage coupling a source is asked at the stages; what is recorded is at t_k."""
+    """Under stage coupling a source runs at the stages; the recorded values are those at t_k."""
     y = signal(RecordSource(VALUES[:50], 0.01, scale=2.0), 0.01, 0.49, coupling="continuous")
     assert np.array_equal(y, 2.0 * VALUES[:50])
 

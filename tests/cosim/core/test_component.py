@@ -22,7 +22,8 @@ class Pipe:
     def ports(self, direction):
         number = Port("", "in", unit="kN") if direction == "input" else Port("", "out", (3,), "N", count=3)
         text = Port("", f"text_{direction}", kind="String")
-        return {port.name: port for port in (number, text)}
+        words = Port("", f"words_{direction}", (2,), kind="String", count=2)
+        return {port.name: port for port in (number, text, words)}
 
 
 def test_every_kind_keeps_the_contract(tmp_path):
@@ -46,6 +47,10 @@ def test_a_system_knows_no_kinds():
     assert system.text_connections == []
     with pytest.raises(WiringError, match=r"b\.text_output is a String and a\.in is a number"):
         system.connect("b.text_output", "a.in")
+    with pytest.raises(WiringError, match=r"b\.words_output is an array of type String; only single values"):
+        system.connect("b.words_output", "a.text_input")
+    with pytest.raises(WiringError, match=r"transformation \(inf, 0\.0\) must be finite"):
+        system.connect("mass.x", "a.in", transformation=(float("inf"), 0.0))
 
 
 @pytest.mark.parametrize("what", [Gain, 3, None, object()])

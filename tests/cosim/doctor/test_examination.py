@@ -198,10 +198,14 @@ def test_a_description_that_is_not_valid_is_found(bad, tmp_path):
 def test_units_that_are_missing_or_not_known(bad, tmp_path):
     text = description("good").replace('<Real unit="N" start="0"/>', '<Real start="0"/>')
     text = text.replace('"m"', '"furlog"').replace('name="m" ', 'name="furlog" ')
-    path = changed(tmp_path / "x.fmu", bad("good"), lambda n, old: text.encode() if n[0] == "m" else old)
-    level, words = probed(path, "units", "")
-    assert level == "note"
-    assert words == "1 of 3 inputs and outputs have none: u; not known, so not converted: furlog"
+    defined = '<Unit name="furlog"><BaseUnit m="1"/></Unit>'
+    assert defined in text
+    for given, more in ((defined, ""), ('<Unit name="furlog"/>', "; not known, so not converted: furlog")):
+        new = text.replace(defined, given).encode()
+        path = changed(tmp_path / "x.fmu", bad("good"), lambda n, old, new=new: new if n[0] == "m" else old)
+        level, words = probed(path, "units", "")
+        assert level == "note"
+        assert words == f"1 of 3 inputs and outputs have none: u{more}"
 
 
 def test_dependencies_that_are_not_listed_are_named(tmp_path):

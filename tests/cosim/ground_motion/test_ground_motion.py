@@ -1,4 +1,4 @@
-"""Records: .AT2 in its variants, plain columns, resampling, El Centro; and what is refused."""
+"""Ground motions: .AT2 in its variants, plain columns, resampling, El Centro, and errors."""
 
 import subprocess
 import sys
@@ -221,7 +221,7 @@ def test_resample_refuses(dt, method, text):
 
 
 def test_resampling_is_never_silent():
-    """There is no default method: the choice is the user's."""
+    """No method is the default: the user must choose."""
     with pytest.raises(TypeError, match="method"):
         tone(0.02, 1.0).resample(0.01)
 

@@ -1,4 +1,4 @@
-"""SSPs as text: what the tests of the reader put together."""
+"""The parts of an SSP as text, from which the tests of the reader build packages."""
 
 from __future__ import annotations
 

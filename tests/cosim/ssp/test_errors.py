@@ -1,4 +1,4 @@
-"""Every error of the reader of SSP that a file can cause: where, what, and what is supported."""
+"""Every error that an SSP file can cause in the reader: it says where, what, and the remedy."""
 
 from __future__ import annotations
 
@@ -157,6 +157,10 @@ UNSUITABLE = [
         r"component g: '2\.5' must be a whole number",
     ),
     (
+        system(component("g", "Gain", GAIN, NOTE.format(EVERY.replace("2.5", "")))),
+        r"component g: '' must be one whole number",
+    ),
+    (
         nested(connection("a", "b"), kinds=("a inout", "b inout")),
         r"connection sub\.a - sub\.b: both connectors are of kind inout",
     ),
@@ -252,11 +256,11 @@ def test_files_that_are_no_ssp(package, tmp_path):
     with pytest.raises(CosimError, match=r"there is no file .*none\.ssp"):
         read_ssp(tmp_path / "none.ssp")
     (tmp_path / "text.ssp").write_text("text")
-    with pytest.raises(CosimError, match="is no SSP: it is not a ZIP archive"):
+    with pytest.raises(CosimError, match="is not an SSP: it is not a ZIP archive"):
         read_ssp(tmp_path / "text.ssp")
     with zipfile.ZipFile(tmp_path / "empty.ssp", "w") as archive:
         archive.writestr("a.txt", "")
-    with pytest.raises(CosimError, match=r"is no SSP: it has no SystemStructure\.ssd at its top"):
+    with pytest.raises(CosimError, match=r"is not an SSP: it has no SystemStructure\.ssd at its top"):
         read_ssp(tmp_path / "empty.ssp")
     with pytest.raises(CosimError, match=r"has SSP version 3\.0; versions 1\.0 and 2\.0 are supported"):
         read_ssp(package(system(TWO), version="3.0", valid=False))

@@ -1,4 +1,4 @@
-"""SSPs that others write: nested systems, signal dictionaries, units, mappings; and what is refused.
+"""SSPs of other tools: nested systems, signal dictionaries, units, mappings.
 
 Expected values are worked out by hand beside each case. The participants are a gain u = K x
 and an integrator x' = u, so that a lost factor, offset or step shows.

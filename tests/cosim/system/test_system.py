@@ -200,7 +200,7 @@ class Node(Block):
 @settings(max_examples=40)
 @given(data=st.data(), n=st.integers(1, 6))
 def test_random_wirings_equal_a_plain_evaluation(data, n):
-    """Any connections that are no cycle, some one step late, in any order of insertion."""
+    """Any connections without a cycle, some one step late, in any order of insertion."""
     order = data.draw(st.permutations(range(n)))
     system = System({f"n{i}": Node(c=float(i + 1)) for i in order})
     sources: dict[tuple[int, str], tuple[int, bool]] = {}
