@@ -27,7 +27,7 @@ import math
 
 import numpy as np
 
-from ..core.variables import Array
+from ..arrays import Array
 
 M1 = 4294967087.0
 M2 = 4294944443.0

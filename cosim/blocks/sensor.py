@@ -8,8 +8,9 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..core.participant import Continuous, LinearContinuous
-from ..core.variables import Array, Input, Local, Output, Parameter, State
+from ..core.variables import Input, Local, Output, Parameter, State
 from ..errors import DeclarationError
 from ..functions import dot
 from .options import Signal

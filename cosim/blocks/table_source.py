@@ -8,8 +8,9 @@ from typing import Literal, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..core.participant import Block
-from ..core.variables import Array, Output, Parameter
+from ..core.variables import Output, Parameter
 from ..errors import DeclarationError, did_you_mean
 from .options import Sampled
 

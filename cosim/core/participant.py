@@ -23,10 +23,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import DeclarationError, did_you_mean
 from .integrators import integrate_ode4, linear_hold
 from .port import Direction, Port
-from .variables import KINDS, Array, Local, Parameter, Variable, whole_number
+from .variables import KINDS, Local, Parameter, Variable
+from .whole_number import whole_number
 
 #: the kernels, and how many of (t, h) each takes
 KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Literal, TypeAlias, get_args
 
+from ..core.whole_number import whole_number
 from ..errors import FMUError, did_you_mean
 
 Solver = Literal["ode1", "ode2", "ode3", "ode4", "cvode"]
@@ -60,8 +61,7 @@ class ModelExchange:
         solver, tolerance = self.solver, self.tolerance
         if solver is not None and solver not in get_args(Solver):
             raise FMUError(f"solver '{solver}' is not known" + did_you_mean(solver, get_args(Solver)))
-        if not isinstance(self.substeps, int) or self.substeps < 1:
-            raise FMUError(f"substeps={self.substeps!r} must be a whole number, 1 or more")
+        object.__setattr__(self, "substeps", whole_number("substeps", self.substeps, error=FMUError))
         if tolerance is not None and not (isinstance(tolerance, Real) and 1e-14 <= tolerance < 1.0):
             raise FMUError(f"tolerance={tolerance!r} must be a number from 1e-14 to 1, such as 1e-6")
         if solver == "cvode" and self.substeps != 1:

@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..core.variables import Array
+from ..arrays import Array
 from ..errors import RecordError, did_you_mean
 
 #: standard gravity, m/s^2

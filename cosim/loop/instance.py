@@ -30,7 +30,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..core.variables import Array
+from ..arrays import Array
 from .operations import Operation
 from .signals import Failing, RunSignals
 

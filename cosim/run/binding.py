@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Array
 from ..core.component import Component
 from ..core.participant import Participant
 from ..core.port import Port
 from ..core.time_grid import steps_between
-from ..core.variables import Array
 from ..errors import WiringError
 from ..loop.instance import Instance, MakesInstance, Setting, Stepping
 from ..loop.loop import Loop

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..codegen.kernels import kernel_addresses
 from ..core.dependencies import dependencies
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
-from ..core.variables import Array
 from ..errors import CompilationError, CompiledKernelsWarning, DeclarationError, WiringError
 from ..loop.instance import Setting
 from ..loop.operations import Call, Copy, Operation

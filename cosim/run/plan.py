@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any, Literal, get_args
 
 from ..core.port import Port
 from ..core.tableaus import TABLEAUS
 from ..core.time_grid import steps_between
+from ..core.whole_number import whole_number
 from ..errors import OptionError, TimeError, WiringError, did_you_mean
 from ..system.system import System
 
@@ -18,12 +19,12 @@ Coupling = Literal["sampled", "iterated", "continuous"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class RunPlan:
-    """The options of a run, which `simulate` explains; wrong ones are refused when the plan is made.
+    """The options of a run, which `simulate` explains; making the plan checks them.
 
-    It goes whole to the instances, the couplings and the recorder, and a branch of a simulation
-    is made from it again. `record` and `statistics` become tuples of names.
+    The instances, the couplings and the recorder get the whole plan, and a branch of a simulation
+    shares it. `record` and `statistics` become tuples of names.
     """
 
     step: float
@@ -47,14 +48,13 @@ class RunPlan:
         ):
             if value not in known:
                 raise OptionError(f"{name} '{value}' is not known" + did_you_mean(value, known))
-        if not isinstance(self.decimation, Integral) or self.decimation < 1:
-            raise OptionError(f"decimation={self.decimation!r} must be a whole number of steps, 1 or more")
         if not (isinstance(self.tolerance, Real) and 0.0 < float(self.tolerance) < 1.0):
             raise OptionError(
                 f"tolerance={self.tolerance!r} must be a number between 0 and 1: it is relative to the size "
                 "of each exchanged value"
             )
-        checked: dict[str, Any] = {"step": step, "start": start, "decimation": int(self.decimation)}
+        decimation = whole_number("decimation", self.decimation, error=OptionError)
+        checked: dict[str, Any] = {"step": step, "start": start, "decimation": decimation}
         checked |= {"record": _port_names(self.record), "statistics": _port_names(self.statistics)}
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..core.port import Port
-from ..core.variables import Array
 from ..errors import RecordError
 from ..loop.operations import Call, Operation, Record, Sample
 from ..loop.signals import RunSignals

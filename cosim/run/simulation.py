@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from ..core.variables import Array
+from ..arrays import Array
 from ..errors import SimulationEndedWarning, SnapshotError, TimeError, WiringError
 from ..loop.loop import Loop
 from ..loop.signals import EndOfRun, RunSignals, ctrl_c
@@ -84,19 +84,9 @@ def simulate(
     that is not an error: the result up to there is returned, `result.ended` says which
     participant asked and when, and SimulationEndedWarning is warned.
     """
-    plan = RunPlan(
-        step=step,
-        start=start,
-        coupling=coupling,
-        solver=solver,
-        record=record,
-        statistics=statistics,
-        decimation=decimation,
-        jit=jit,
-        tolerance=tolerance,
-    )
+    plan = RunPlan(step, start, coupling, solver, record, statistics, decimation, jit, tolerance)
     plan.point(stop)  # before FMUs are loaded
-    with Simulation(system, **vars(plan)) as simulation:
+    with Simulation._planned(system, plan) as simulation:
         return simulation.run(stop, progress)
 
 
@@ -149,20 +139,21 @@ class Simulation:
         jit: bool = True,
         tolerance: float = 1e-8,
     ) -> None:
+        self._open(
+            system, RunPlan(step, start, coupling, solver, record, statistics, decimation, jit, tolerance)
+        )
+
+    @classmethod
+    def _planned(cls, system: System, plan: RunPlan) -> Self:
+        """Return a simulation with the options of a plan."""
+        simulation = cls.__new__(cls)
+        simulation._open(system, plan)
+        return simulation
+
+    def _open(self, system: System, plan: RunPlan) -> None:
         if not isinstance(system, System):
             raise WiringError(f"{system!r} must be a System; give System({{'plant': ...}}, [...])")
-        self.system = system
-        self.plan = plan = RunPlan(
-            step=step,
-            start=start,
-            coupling=coupling,
-            solver=solver,
-            record=record,
-            statistics=statistics,
-            decimation=decimation,
-            jit=jit,
-            tolerance=tolerance,
-        )
+        self.system, self.plan = system, plan
         recorded, watched = plan.recorded(system), plan.watched(system)
         self._signals = RunSignals()
         self._binding = Binding(system, plan, [*recorded, *watched], self._signals)
@@ -373,7 +364,7 @@ class Simulation:
                 f"{self._unable('can_serialise')} cannot serialise its state (canSerializeFMUState), "
                 "which a second simulation needs; snapshot and restore serve within one simulation"
             )
-        other = Simulation(self.system, **vars(self.plan))
+        other = Simulation._planned(self.system, self.plan)
         try:
             other.restore(snapshot)
         except SimulationError as error:

@@ -25,9 +25,9 @@ from types import NoneType
 
 import numpy as np
 
+from ..arrays import Array
 from ..core.component import Component
 from ..core.port import Direction, Port
-from ..core.variables import Array
 from ..errors import WiringError, did_you_mean
 
 

@@ -26,7 +26,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ...core.variables import Array
+from ...arrays import Array
 from ...errors import FMUError, WiringError
 from ...loop.operations import SLACK
 from ...loop.signals import RunSignals, ctrl_c

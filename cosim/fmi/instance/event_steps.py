@@ -15,8 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
+from ...arrays import Array
 from ...core.tableaus import TABLEAUS
-from ...core.variables import Array
 from ...loop.operations import SLACK
 from ...result import SimulationError
 from .continuous_time import ContinuousTime

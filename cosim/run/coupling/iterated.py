@@ -18,8 +18,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...arrays import Array
 from ...core.port import Port
-from ...core.variables import Array
 from ...errors import WiringError
 from ...loop.instance import buffer
 from ...loop.loop import Loop

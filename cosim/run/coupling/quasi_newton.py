@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core.variables import Array
+from ...arrays import Array
 
 _REBUILD = 6  # evaluations with a kept Jacobian before it is built again
 _LIMIT = 30  # evaluations, not counting those that build the Jacobian
