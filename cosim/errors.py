@@ -6,7 +6,7 @@ text and ends with exit code 2; a traceback means a defect of structcosim itself
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 
@@ -56,6 +56,14 @@ class CompiledKernelsWarning(UserWarning):
 
 class LateEventWarning(UserWarning):
     """An event was handled at the end of the step in which it occurs."""
+
+
+def check_known(
+    what: str, value: object, known: Collection[str], error: type[CosimError] = OptionError
+) -> None:
+    """Raise `error` if a value is not one of the known names."""
+    if value not in known:
+        raise error(f"{what} '{value}' is not known" + did_you_mean(value, known))
 
 
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array
 from ..core.participant import Block
 from ..core.variables import Output, Parameter
-from ..errors import DeclarationError, did_you_mean
+from ..errors import DeclarationError, check_known
 from .options import Sampled
 
 
@@ -46,9 +46,7 @@ class TableSource(Block):
         **sampled: Unpack[Sampled],
     ) -> None:
         """Take (n,) instants in s that do not decrease, or one interval, and (n,) or (n, m) values."""
-        if interpolation not in ("linear", "hold"):
-            hint = did_you_mean(str(interpolation), ["linear", "hold"])
-            raise DeclarationError(f"TableSource: interpolation '{interpolation}' is not known{hint}")
+        check_known("TableSource: interpolation", interpolation, ("linear", "hold"), DeclarationError)
         t: Array = np.asarray(instants, dtype=np.float64)
         v: Array = np.asarray(rows, dtype=np.float64)
         v = v[:, None] if v.ndim == 1 else v

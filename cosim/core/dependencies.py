@@ -22,10 +22,9 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
-from .participant import Participant
+from .participant import VECTORS, Participant
 
 _EVALUATION = ("derivatives", "outputs", "step")
-_VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
 
 
 class _Flow(ast.NodeVisitor):
@@ -221,7 +220,7 @@ def dependencies(participant: Participant) -> dict[str, set[str]]:
     wanted = [n for n, kind in kinds.items() if kind in ("output", "derivative")]
     edges: list[tuple[set[str], set[str]]] = []
     dimensions = {f".{n}": len(v.shape) for n, v in participant.variables.items()}
-    dimensions |= {f".{vector}": 1 for vector in _VECTORS}
+    dimensions |= {f".{vector}": 1 for vector in VECTORS}
     for name in _EVALUATION:
         if name in participant.kernels:
             more = _edges(participant.kernels[name], dimensions) if participant.compiled else None
@@ -230,7 +229,7 @@ def dependencies(participant: Participant) -> dict[str, set[str]]:
             edges += more
     reach: dict[str, set[str]] = {f".{n}": {n} if n in sources else set() for n in kinds}
     written, read = (set().union(*(edge[side] for edge in edges)) for side in (0, 1))
-    for vector, kind in _VECTORS.items():
+    for vector, kind in VECTORS.items():
         members = {f".{n}" for n, k in kinds.items() if k == kind}
         edges += [(members, {f".{vector}"})] if f".{vector}" in written else []
         edges += [({f".{vector}"}, members)] if f".{vector}" in read else []

@@ -32,10 +32,10 @@ from .whole_number import whole_number
 
 #: the kernels, and how many of (t, h) each takes
 KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
-_VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
+VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
 #: attributes that each instance owns and no copy may share
-_BOUND = {"memory", "variables", "zones", "_views", *_VECTORS}
-_RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
+_BOUND = {"memory", "variables", "zones", "_views", *VECTORS}
+_RESERVED = {*VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
 #: names of sizes that a Continuous computes itself
 _AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
 
@@ -212,7 +212,7 @@ class Participant:
         for name, v in self.variables.items():
             shape = tuple(int(n) for n in v.shape)
             self._views[name] = memory[v.slot : v.slot + v.size].reshape(shape)
-        for name, kind in _VECTORS.items():
+        for name, kind in VECTORS.items():
             first, size = self.zones[kind]
             setattr(self, name, memory[first : first + size] if size else memory[-1:])
 
@@ -221,7 +221,7 @@ class Participant:
         """The storage as a NumPy dtype; the vectors overlap the variables of their zone."""
         fields = {n: (v.slot, v.shape) for n, v in self.variables.items()}
         spare = self.memory.size - 1
-        for name, kind in _VECTORS.items():
+        for name, kind in VECTORS.items():
             first, size = self.zones[kind]
             fields[name] = (first, (size,)) if size else (spare, (1,))
         return np.dtype(

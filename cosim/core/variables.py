@@ -15,6 +15,7 @@ that value.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -58,7 +59,7 @@ class Variable:
     @property
     def size(self) -> int:
         """Number of float64 slots."""
-        return int(np.prod([int(n) for n in self.shape], dtype=np.int64)) if self.shape else 1
+        return math.prod(int(n) for n in self.shape)
 
     def __set_name__(self, owner: type, name: str) -> None:
         object.__setattr__(self, "name", name)

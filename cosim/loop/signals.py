@@ -35,8 +35,8 @@ class RunSignals:
 
     def __init__(self) -> None:
         self.exception: BaseException | None = None
-        self.participant = ""
-        self.time = 0.0
+        #: the participant that raised it, and when
+        self.place = ""
         #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
         self.interrupted = False
         #: the participant that asked to end the run, and when; "" while none does
@@ -65,20 +65,25 @@ class RunSignals:
             raise EndOfRun(text)
         self.set_end(self.end or text)
 
+    def note(self, exception: BaseException, name: str, t: float, when: str = "at") -> None:
+        """Keep an exception that a participant raised, for the simulation."""
+        self.exception, self.place = exception, f"{name} failed {when} t = {t:g} s"
+
     def error(self) -> SimulationError:
         """Return the exception that a callback left as an error of the run."""
         text = str(self.exception)
         if not isinstance(self.exception, SimulationError):  # which says place and time itself
             kind = type(self.exception).__name__
-            text = f"{self.participant} failed at t = {self.time:g} s: {kind}: {text}"
+            text = f"{self.place}: {kind}: {text}"
         error = SimulationError(text)
         error.__cause__ = self.exception
         return error
 
-    def callback(self, name: str, function: Callable[[float, float], None]) -> int:
+    def callback(self, name: str, function: Callable[[float, float], None], when: str = "at") -> int:
         """Return the address of a C callback for `function(t, h)`, which turns any exception into status 1.
 
-        The callback lives as long as these signals.
+        `when` says in an error how the exception is related to t. The callback lives as long as these
+        signals.
         """
 
         def guarded(_: int, t: float, h: float) -> int:
@@ -87,7 +92,7 @@ class RunSignals:
                 if self.interrupted:
                     raise KeyboardInterrupt
             except BaseException as exception:
-                self.exception, self.participant, self.time = exception, name, t
+                self.note(exception, name, t, when)
                 return 1
             return 0
 

@@ -38,9 +38,9 @@ class Binding:
         for t_k
     """
 
-    def __init__(self, system: System, plan: RunPlan, used: Iterable[Port], signals: RunSignals) -> None:
-        """Make the instances; `used` are the ports that are read beside those that are connected."""
-        self.system, self.plan, self.signals = system, plan, signals
+    def __init__(self, system: System, plan: RunPlan, used: Iterable[Port]) -> None:
+        """Make the instances; `used` are the ports that are read in addition to the connected ones."""
+        self.system, self.plan, self.signals = system, plan, RunSignals()
         self.instances: dict[str, Instance] = {}
         components = system.participants
         self.blocks = system.block_order()
@@ -59,7 +59,7 @@ class Binding:
                     is_stage=plan.coupling == "continuous",
                     jit=plan.jit,
                     used=names[name],
-                    signals=signals,
+                    signals=self.signals,
                 )
                 self.instances[name] = _instance(name, component, setting)
             for c in system.text_connections:

@@ -54,7 +54,8 @@ class KernelInstance:
                 self.is_compiled = False
         if not self.is_compiled:
             for kernel in participant.kernels:
-                self._addresses[kernel] = self.signals.callback(name, self._interpreted(kernel))
+                when = "in the step from" if kernel == "advance" else "at"
+                self._addresses[kernel] = self.signals.callback(name, self._interpreted(kernel), when)
         states = self.participant.zones["state"]
         self.n_states = states[1] if is_continuous else 0
         self.state_address = self.base + 8 * states[0]
@@ -168,21 +169,15 @@ class KernelInstance:
             ops.append(self._call("outputs", "outputs", fraction, self._outputs if final else (0, 0)))
         return ops
 
-    def read_texts(self) -> list[Operation]:
-        """There are no strings or binary data."""
+    def _nothing(self, fraction: float = 0.0) -> list[Operation]:
+        """Return no operations: there are no texts, and kernels use inputs and states where they lie."""
         return []
 
-    def latch(self) -> list[Operation]:
-        """Inputs are read where they lie."""
-        return []
+    read_texts = latch = set_states = complete = _nothing
 
     def advance(self) -> list[Operation]:
         """Carry the states over the step."""
         return [self._call("advance", "advance", 0.0, (self.state_address, self.n_states))]
-
-    def set_states(self, fraction: float) -> list[Operation]:
-        """States are combined where they lie."""
-        return []
 
     def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Evaluate the derivatives and copy them to `target`."""
@@ -190,10 +185,6 @@ class KernelInstance:
             return []
         copy = Copy(source=self.derivative_address, target=target, count=self.n_states)
         return [self._call("derivatives", "derivatives", fraction), copy]
-
-    def complete(self) -> list[Operation]:
-        """Nothing happens between steps."""
-        return []
 
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output, the inputs on which it depends directly."""
@@ -212,7 +203,8 @@ class KernelInstance:
 
     def failed(self, status: int, t: float) -> str:
         """Return the meaning of a kernel that failed."""
-        return f"{self.name} failed with an exception in its kernel (jit=False shows where) at t = {t:g} s"
+        where = "(jit=False shows where), called at"
+        return f"{self.name} failed with an exception in its kernel {where} t = {t:g} s"
 
     def log(self) -> list[str]:
         """Kernels do not log."""

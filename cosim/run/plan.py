@@ -9,10 +9,9 @@ from numbers import Real
 from typing import Any, Literal, get_args
 
 from ..core.port import Port
-from ..core.tableaus import TABLEAUS
 from ..core.time_grid import steps_between
 from ..core.whole_number import whole_number
-from ..errors import OptionError, TimeError, WiringError, did_you_mean
+from ..errors import OptionError, TimeError, WiringError, check_known
 from ..system.system import System
 
 Coupling = Literal["sampled", "iterated", "continuous"]
@@ -42,12 +41,8 @@ class RunPlan:
         step, start = _seconds("step", self.step), _seconds("start", self.start)
         if step <= 0.0:
             raise TimeError(f"step={step:g} s; a communication step must be above zero")
-        for name, value, known in (
-            ("coupling", self.coupling, get_args(Coupling)),
-            ("solver", self.solver, tuple(TABLEAUS)),
-        ):
-            if value not in known:
-                raise OptionError(f"{name} '{value}' is not known" + did_you_mean(value, known))
+        check_known("coupling", self.coupling, get_args(Coupling))
+        check_known("solver", self.solver, get_args(Solver))
         if not (isinstance(self.tolerance, Real) and 0.0 < float(self.tolerance) < 1.0):
             raise OptionError(
                 f"tolerance={self.tolerance!r} must be a number between 0 and 1: it is relative to the size "

@@ -19,7 +19,6 @@ from ..arrays import Array
 from ..core.port import Port
 from ..errors import RecordError
 from ..loop.operations import Call, Operation, Record, Sample
-from ..loop.signals import RunSignals
 from ..result import Statistics
 from .binding import Binding
 
@@ -30,17 +29,10 @@ MEMORY_LIMIT = 200_000_000
 class Recorder:
     """Records ports at every n-th communication point, and keeps statistics of ports at every one."""
 
-    def __init__(
-        self,
-        recorded: Sequence[Port],
-        watched: Sequence[Port],
-        decimation: int,
-        binding: Binding,
-        signals: RunSignals,
-    ) -> None:
+    def __init__(self, recorded: Sequence[Port], watched: Sequence[Port], binding: Binding) -> None:
         texts = [port for port in recorded if port.kind != "number"]
         self.recorded, self.watched = [p for p in recorded if p.kind == "number"], watched
-        self.decimation = decimation
+        self.decimation = decimation = binding.plan.decimation
         self.texts: dict[str, list[str | bytes]] = {str(port): [] for port in texts}
         self._place = np.zeros(2, dtype=np.int64)  # address of the rows, number of rows so far
         self._first = 0  # the point at which the first row lies, over the decimation
@@ -57,7 +49,7 @@ class Recorder:
         self.operations: list[Operation] = []
         if texts:
             line = f"record {', '.join(self.texts)} (Python callback)"
-            keep = signals.callback("record", keep_texts)
+            keep = binding.signals.callback("record", keep_texts)
             self.operations.append(Call(text=line, function=keep, every=decimation))
         if len(self._watched):
             sample = Sample(

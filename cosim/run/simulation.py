@@ -30,7 +30,7 @@ from typing import Any, Self
 from ..arrays import Array
 from ..errors import SimulationEndedWarning, SnapshotError, TimeError, WiringError
 from ..loop.loop import Loop
-from ..loop.signals import EndOfRun, RunSignals, ctrl_c
+from ..loop.signals import EndOfRun, ctrl_c
 from ..result import Interrupted, Result, SimulationError
 from ..system.system import System
 from .binding import Binding
@@ -155,10 +155,10 @@ class Simulation:
             raise WiringError(f"{system!r} must be a System; give System({{'plant': ...}}, [...])")
         self.system, self.plan = system, plan
         recorded, watched = plan.recorded(system), plan.watched(system)
-        self._signals = RunSignals()
-        self._binding = Binding(system, plan, [*recorded, *watched], self._signals)
+        self._binding = Binding(system, plan, [*recorded, *watched])
+        self._signals = self._binding.signals
         try:
-            self._recorder = Recorder(recorded, watched, plan.decimation, self._binding, self._signals)
+            self._recorder = Recorder(recorded, watched, self._binding)
             self._coupling = self._coupled()
         except BaseException:
             self._binding.close()

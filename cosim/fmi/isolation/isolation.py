@@ -143,7 +143,7 @@ class Isolation:
             return int(self.is_gone)
         except BaseException as exception:  # Ctrl-C, which C code cannot raise
             self.is_gone = True
-            self.signals.exception, self.signals.participant, self.signals.time = exception, self.name, t
+            self.signals.note(exception, self.name, t)
             return 1
 
     def _ending(self, code: int) -> str:

@@ -109,6 +109,27 @@ def test_a_raise_in_a_compiled_kernel_stops_the_run():
         simulate(System({"block": RaisesCompiled()}), step=0.1, stop=5.0, jit=False)
 
 
+class FailsInside(Continuous):
+    """x' = -x until t = 0.22"""
+
+    compiled = False
+    x = State(1.0)
+
+    def derivatives(self, t):
+        if t > 0.22:
+            raise ValueError("too late")
+        self.der_x = -self.x
+
+
+@pytest.mark.parametrize(
+    ("coupling", "when"), [("sampled", r"in the step from t = 0\.2 s"), ("continuous", r"at t = 0\.25 s")]
+)
+def test_an_exception_in_derivatives_names_the_step_or_the_stage(coupling, when):
+    """ode4 evaluates the derivatives at 0.25 s; `advance` is called at 0.2 s, for the whole step."""
+    with pytest.raises(SimulationError, match=f"plant failed {when}: ValueError: too late"):
+        simulate(System({"plant": FailsInside()}), step=0.1, stop=1.0, coupling=coupling, solver="ode4")
+
+
 class BadStart(Block):
     y = Output()
     K = Parameter(-1.0)

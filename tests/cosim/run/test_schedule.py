@@ -209,8 +209,6 @@ class Adder(Block):
 
 
 def test_statistics_and_records_come_after_the_blocks():
-    from cosim import simulate
-
     system = System({"i": Integrator(), "sum": Adder()}, [("i.x", "sum.a"), ("i.y", "sum.b")])
     result = simulate(system, step=0.5, stop=1.0, record=["sum.u"], statistics=["i.x", "sum.u"], decimation=2)
     assert result.schedule.splitlines()[-5:] == [

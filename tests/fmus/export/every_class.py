@@ -67,9 +67,14 @@ def classes() -> dict[str, type[Participant]]:
             module = importlib.import_module(entry.name)
             for value in vars(module).values():
                 own = isinstance(value, type) and value.__module__ == entry.name
-                if own and issubclass(value, Participant):
+                if own and issubclass(value, Participant) and not _is_shared_base(value):
                     found[f"{entry.name}.{value.__name__}"] = value
     return found
+
+
+def _is_shared_base(kind: type[Participant]) -> bool:
+    """Tell whether a class only holds what its subclasses share: a private one that has subclasses."""
+    return kind.__name__.startswith("_") and bool(kind.__subclasses__())
 
 
 @lru_cache(maxsize=1)
