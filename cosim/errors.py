@@ -1,4 +1,4 @@
-"""Errors that say where, what, and what to do about it; and warnings.
+"""The errors and warnings of cosim; the text of an error gives the place, the fault and the remedy.
 
 Every error that a user can cause derives from `CosimError`. The command line prints its
 text and ends with exit code 2; a traceback means a defect of structcosim itself.
@@ -11,7 +11,7 @@ from difflib import get_close_matches
 
 
 class CosimError(Exception):
-    """An error with a place, a fact and a remedy."""
+    """An error with a place, a fault and a remedy."""
 
 
 class DeclarationError(CosimError):
@@ -43,7 +43,7 @@ class OptionError(CosimError):
 
 
 class SnapshotError(CosimError):
-    """A state that cannot be saved or returned to."""
+    """A state that cannot be saved or restored."""
 
 
 class SimulationEndedWarning(UserWarning):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
 
 
-#: the fields that .npz keeps beside time, signals and statistics
+#: the fields that .npz keeps besides time, signals and statistics
 _SAVED = ("units", "step", "steps", "seconds", "schedule", "interrupted", "ended")
 
 

@@ -126,7 +126,7 @@ def function_source(
         function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s^2")
 
     A function in Numba's subset is compiled with the block, closures over numbers
-    included; any other runs as a callback, of which the run warns.
+    included; any other runs as a callback, with a CompiledKernelsWarning.
     """
     if not callable(function):
         raise DeclarationError(f"function_source needs a function of time, got {function!r}")

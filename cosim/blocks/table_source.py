@@ -23,7 +23,7 @@ class TableSource(Block):
         linear:  y = v_i + q (v_{i+1} - v_i),  q = (t - t_i) / (t_{i+1} - t_i)
 
     Two rows at one instant are a jump: the second counts there. An instant that is less
-    than 1e-9 of a step after t is at t.
+    than 1e-9 of a step after t counts as t.
 
     At a constant interval, t_i = i interval, the row is found by division:
 

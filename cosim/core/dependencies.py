@@ -1,13 +1,13 @@
-"""Which outputs depend on which inputs (feedthrough): read off the source code of the kernels.
+"""Feedthrough: the inputs on which each output depends, read off the source code of the kernels.
 
-A run orders its evaluation by this answer (stage coupling, algebraic cycles): it holds for every
+A run orders its evaluation by this result (stage coupling, algebraic cycles): it holds for every
 value of the parameters, and needs no compilation. The model structure of an exported FMU refines
 it by element, for the parameters as they are: fmus/export/dependencies.py.
 
-The answer is a superset, by variable: assignments are followed without regard to their
+The result is a superset, by variable: assignments are followed without regard to their
 order, a condition counts for everything assigned under it (for everything, where it
-leads to a return, break or continue), a name for an array shares what is written to it,
-and a call writes those arguments that the source of the called function writes. The
+leads to a return, break or continue), all names of an array share its values, and a call
+writes those arguments that the source of the called function writes. The
 outputs of a kernel that cannot be read depend on every input and state.
 """
 
@@ -37,7 +37,7 @@ class _Flow(ast.NodeVisitor):
         self.dimensions = dimensions
         self.conditions: list[set[str]] = []
         self.edges: list[tuple[set[str], set[str]]] = []
-        #: the names on which it depends whether the rest of the function runs
+        #: the names that decide whether the rest of the function runs
         self.jumps: set[str] = set()
         #: names with elements that are written, and names that share memory with each other
         self.stored: set[str] = set()
@@ -151,7 +151,7 @@ class _Flow(ast.NodeVisitor):
             if isinstance(argument, ast.Name) and argument.id == self.self_name:
                 self.opaque = True
         if receiver and self.names(receiver[0]) - self.globals.keys():
-            self.opaque = True  # a method of what a variable holds
+            self.opaque = True  # a method of the value of a variable
         parameters = None if node.keywords else _written(self.called(node.func))
         changed = [a for i, a in enumerate(given) if parameters is None or i in parameters]
         written = set().union(*(self.memory_of(a) for a in changed))

@@ -204,7 +204,7 @@ class Participant:
             zones[kind] = (first, slot - first)
         #: first slot and number of slots of each kind
         self.zones = zones
-        self._bind(np.zeros(slot + 1))  # with a spare slot, which the vector of an empty zone shows
+        self._bind(np.zeros(slot + 1))  # one spare slot, to which the vector of an empty zone refers
 
     def _bind(self, memory: Array) -> None:
         self.memory = memory

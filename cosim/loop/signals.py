@@ -46,19 +46,19 @@ class RunSignals:
         self._callbacks: list[Any] = []
 
     def clear(self) -> None:
-        """Forget all signals: the simulation goes on from where it stands, or from a snapshot."""
+        """Clear all signals: the simulation continues from the present point, or from a snapshot."""
         self.exception, self.interrupted = None, False
         self.set_end("")
 
     def set_end(self, text: str) -> None:
-        """Let the run end at the next point, or go on if the text is empty."""
+        """Let the run end at the next point, or continue if the text is empty."""
         self.end, self.stop[0] = text, bool(text)
 
     def ask_to_end(self, name: str, t: float, at_end: bool) -> None:
         """Note that a participant asks at t to end the run.
 
-        At the end of a step the run goes on to the communication point that is reached;
-        inside it, EndOfRun leaves the step.
+        At the end of a step the run continues to the communication point that is reached;
+        inside a step, EndOfRun leaves it.
         """
         text = f"{name} asked to end the simulation at t = {t:.10g} s"
         if not at_end:
@@ -72,7 +72,7 @@ class RunSignals:
     def error(self) -> SimulationError:
         """Return the exception that a callback left as an error of the run."""
         text = str(self.exception)
-        if not isinstance(self.exception, SimulationError):  # which says place and time itself
+        if not isinstance(self.exception, SimulationError):  # which names place and time itself
             kind = type(self.exception).__name__
             text = f"{self.place}: {kind}: {text}"
         error = SimulationError(text)
@@ -104,8 +104,8 @@ class RunSignals:
 def ctrl_c(signals: RunSignals) -> Iterator[None]:
     """Note Ctrl-C, to be acted upon between chunks or after a callback.
 
-    KeyboardInterrupt at any moment might be raised while Python enters a callback from C, where
-    it is printed and lost, and the run goes on. A second Ctrl-C is raised at once.
+    KeyboardInterrupt might otherwise be raised while Python enters a callback from C, where it is
+    printed and lost, and the run continues. A second Ctrl-C is raised at once.
     """
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -125,7 +125,7 @@ def ctrl_c(signals: RunSignals) -> Iterator[None]:
 
 
 class Failing(Protocol):
-    """An instance, as far as an error about it needs it."""
+    """The part of an instance that an error message needs."""
 
     name: str
 

@@ -1,7 +1,7 @@
 """The running instance of a block or continuous system: its kernels and a copy of its storage.
 
-Kernels are compiled, or called back as Python where Numba cannot compile them. Inputs and
-states stay where they lie in the storage, so there is nothing to latch or to set.
+Kernels are compiled, or called back as Python where Numba cannot compile them. They read
+inputs and states in place, so an instance has nothing to latch or to set.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class KernelInstance:
         is_continuous = isinstance(participant, Continuous)
         if setting.is_stage and is_continuous and "derivatives" not in participant.kernels:
             raise WiringError(
-                f"{name} ({type(participant).__name__}) moves by its advance alone and has no derivatives, "
-                'which stage coupling integrates; use coupling="sampled"'
+                f"{name} ({type(participant).__name__}) has only an advance and no derivatives, "
+                'which stage coupling needs; use coupling="sampled"'
             )
         self.name = name
         self.signals = setting.signals
@@ -75,7 +75,7 @@ class KernelInstance:
             before = self.participant.memory.copy()
             function = KERNEL(self._addresses["initialize"])
             if function(self.base, t0, 0.0) != 0 and self.signals.exception is None:
-                self.participant.memory[:] = before  # compiled code does not say which exception it was
+                self.participant.memory[:] = before  # compiled code does not name the exception
                 again = KERNEL(self.signals.callback(self.name, self._interpreted("initialize")))
                 if again(self.base, t0, 0.0) == 0:
                     raise SimulationError(f"{self.name} failed in initialize(self); check its parameters")
@@ -112,7 +112,7 @@ class KernelInstance:
             )
 
     def stop(self) -> str:
-        """Nothing to release, nothing that could crash."""
+        """Return "": the memory is freed with the instance, without a crash."""
         return ""
 
     #: Python attributes and the storage can be copied
@@ -126,7 +126,7 @@ class KernelInstance:
         return made.__module__, made.__qualname__, self.is_compiled, self.participant.memory.size
 
     def save(self, serialised: bool = True) -> tuple[Array, dict[str, Any]]:
-        """Return a copy of the storage, and of the attributes that a block in Python has beside it."""
+        """Return a copy of the storage, and of the Python attributes of a block that runs in Python."""
         attributes = {} if self.is_compiled else self.participant.own_attributes()
         return self.participant.memory.copy(), attributes
 
@@ -170,7 +170,7 @@ class KernelInstance:
         return ops
 
     def _nothing(self, fraction: float = 0.0) -> list[Operation]:
-        """Return no operations: there are no texts, and kernels use inputs and states where they lie."""
+        """Return no operations: a kernel has no texts and reads inputs and states in place."""
         return []
 
     read_texts = latch = set_states = complete = _nothing
@@ -202,7 +202,7 @@ class KernelInstance:
         return "?"
 
     def failed(self, status: int, t: float) -> str:
-        """Return the meaning of a kernel that failed."""
+        """Return the message for a kernel that failed when it was called at t."""
         where = "(jit=False shows where), called at"
         return f"{self.name} failed with an exception in its kernel {where} t = {t:g} s"
 

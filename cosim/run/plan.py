@@ -72,13 +72,13 @@ class RunPlan:
         ]
 
     def watched(self, system: System) -> list[Port]:
-        """Return the ports to keep statistics of; refuse strings and binary data that are asked for."""
+        """Return the ports to keep statistics of; refuse strings and binary data among the given ones."""
         if self.statistics is None:
             return [port for port in self.recorded(system) if port.kind == "number"]
         ports = [_readable(system, name) for name in self.statistics]
         for port in ports:
             if port.kind != "number":
-                raise WiringError(f"{port} is a {port.kind}; statistics are of numbers, so leave it out")
+                raise WiringError(f"{port} is a {port.kind}; statistics need numbers, so leave it out")
         return ports
 
 

@@ -1,9 +1,9 @@
 """The recorder of a run: signals, statistics and texts, written by operations of the loop.
 
-Everything is recorded at communication points, after the blocks. Rows of floats and the
-statistics are written by the compiled loop, strings and binary data by a callback. A run
-that goes on from a point that was evaluated before records that point again as its first
-one, by the same operations (loop.py: `resume`).
+Everything is recorded at communication points, after the blocks. The compiled loop writes
+rows of floats and the statistics, a callback the strings and binary data. A run that
+continues from an evaluated point records that point again, as its first one, by the same
+operations (loop.py: `resume`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Recorder:
         self.decimation = decimation = binding.plan.decimation
         self.texts: dict[str, list[str | bytes]] = {str(port): [] for port in texts}
         self._place = np.zeros(2, dtype=np.int64)  # address of the rows, number of rows so far
-        self._first = 0  # the point at which the first row lies, over the decimation
+        self._first = 0  # the point of the first row, divided by the decimation
         self._recorded, self._watched = (_addresses(ports, binding) for ports in (self.recorded, watched))
         self._rows: Array = np.empty((0, len(self._recorded)))
         self._kept = np.zeros((max(len(self._watched), 1), 4))
@@ -71,7 +71,7 @@ class Recorder:
             self.operations.append(record)
 
     def open(self, k: int, last: int) -> None:
-        """Make room for the points k to `last`, and forget all that was recorded before."""
+        """Make room for the points k to `last`, and discard the earlier recording."""
         self._first = -(-k // self.decimation)
         self._rows = _room(last // self.decimation - self._first + 1, len(self._recorded))
         self._place[:] = self._rows.ctypes.data, 0
@@ -112,7 +112,7 @@ def _addresses(ports: Sequence[Port], binding: Binding) -> np.ndarray[Any, np.dt
 
 
 def _parts(ports: Iterable[Port]) -> Iterator[tuple[Port, slice, bool]]:
-    """Return where the floats of each port lie among those of all ports, and whether it is a scalar."""
+    """Return, for each port, the slice of its floats among those of all ports, and whether it is a scalar."""
     first = 0
     for port in ports:
         yield port, slice(first, first + port.count), port.shape == () or port.count == 1

@@ -1,21 +1,21 @@
-"""A run that can be stopped and carried on, returned to an earlier point, and branched.
+"""Simulations: runs that can be paused, continued, returned to an earlier point, and branched.
 
     with Simulation(system, step=0.01) as simulation:
         simulation.run(5.0)
-        there = simulation.snapshot()
+        before = simulation.snapshot()
         one = simulation.run(10.0)
-        simulation.restore(there)
+        simulation.restore(before)
         same = simulation.run(10.0)
 
-`simulate` is one run from start to stop. Time is the integer k, t_k = start + k step; nothing
-is summed up. A run is put together in four steps, each in a file of its own:
+`simulate` is one run from start to stop. Time is the integer k, with t_k = start + k step; no
+sum of steps is kept. A run is built in four steps, each in a separate file:
 
     plan.py      the options, checked
     binding.py   the components of the system as running instances, its connections as copies
     coupling/    the operations of a communication step, in their order: `Result.schedule`
     recorder.py  signals, texts and statistics, recorded at communication points
 
-and then carried out by the compiled loop (cosim/loop).
+The compiled loop (cosim/loop) then carries it out.
 """
 
 from __future__ import annotations
@@ -80,9 +80,9 @@ def simulate(
 
     Raises CosimError for anything that can be checked before the run, SimulationError (with
     `result`, computed until then) when a participant fails or gives a value that is not
-    finite, Interrupted (with `result`) on Ctrl-C. When a participant asks to end the run,
-    that is not an error: the result up to there is returned, `result.ended` says which
-    participant asked and when, and SimulationEndedWarning is warned.
+    finite, Interrupted (with `result`) on Ctrl-C. A participant that asks to end the run is
+    not an error: the result up to that point is returned, `result.ended` names the
+    participant and the time, and SimulationEndedWarning is issued.
     """
     plan = RunPlan(step, start, coupling, solver, record, statistics, decimation, jit, tolerance)
     plan.point(stop)  # before FMUs are loaded
@@ -103,8 +103,8 @@ class Snapshot:
     time
         of the point, in s
     portable
-        False when an FMU cannot serialise its state: then the snapshot serves only the
-        simulation that it was taken from, while that is open
+        False when an FMU cannot serialise its state: the snapshot can then be restored only
+        in the simulation that it was taken from, while that one is open
     """
 
     time: float
@@ -164,7 +164,7 @@ class Simulation:
             self._binding.close()
             raise
         self._recording = [*self._recorder.operations, *self._binding.keep]
-        #: the arrays that belong to the state, beside those of the instances
+        #: the arrays that belong to the state, besides those of the instances
         self._memory = [*self._binding.memory, *self._coupling.memory]
         self._loop: Loop | None = None
         #: the point that comes next, or, once its outputs have been evaluated, the present one
@@ -200,7 +200,7 @@ class Simulation:
             self._binding.close()
 
     def close(self) -> None:
-        """Terminate and free the FMUs; results stay.
+        """Terminate and free the FMUs; results remain valid.
 
         Raises SimulationError when an isolated FMU crashes while it is freed, Interrupted on Ctrl-C
         while it hangs there, both with the last `result`.
@@ -218,13 +218,13 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """The communication point at which the simulation stands, in s."""
+        """The present communication point, in s."""
         return self.plan.start + self._k * self.plan.step
 
     # ----------------------------------------------------------------------------- runs
 
     def run(self, until: float, progress: Callable[[int, int], None] | None = None) -> Result:
-        """Run from the present communication point to `until`, in s; the result has both.
+        """Run from the present communication point to `until`, in s; the result includes both.
 
         Raises SimulationError (with `result`, computed until then) when a participant fails
         or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C. When a
@@ -232,7 +232,7 @@ class Simulation:
         """
         last = self.plan.point(until)
         if last < self._k or (last == self._k and self._acted):
-            raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
+            raise TimeError(f"run until {until:g} s: the simulation is already at {self.time:g} s")
         with ctrl_c(self._signals):
             self._check_usable("run")
             loop = self._begun()
@@ -306,7 +306,7 @@ class Simulation:
     # ------------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> Snapshot:
-        """Return the whole state of the simulation; `restore` returns to it, as often as you like.
+        """Return the whole state of the simulation; `restore` returns to it, any number of times.
 
         Raises SnapshotError, naming the FMUs, when they cannot get and set their state.
         """
@@ -325,22 +325,22 @@ class Simulation:
         return Snapshot(self.time, portable, place, parts, memory, self._token, self._kind())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Return to a snapshot; signals recorded since then stay in the results that were returned.
+        """Return to a snapshot; results that were returned since then keep their signals.
 
-        A snapshot of another simulation serves if that one has the same participants and
-        options. Raises SnapshotError if it does not.
+        A snapshot of another simulation is accepted if that one has the same participants and
+        options. Raises SnapshotError otherwise.
         """
         self._check_open("restore a snapshot")
         if not isinstance(snapshot, Snapshot):
             raise SnapshotError(f"{snapshot!r} must be a snapshot, as `snapshot` returns it")
         if snapshot.kind != self._kind():
             raise SnapshotError(
-                f"the snapshot at t = {snapshot.time:g} s is of another simulation: participants, connected "
-                "and recorded ports, step, start, coupling, solver and jit must be the same"
+                f"the snapshot at t = {snapshot.time:g} s belongs to another simulation: participants, "
+                "connected and recorded ports, step, start, coupling, solver and jit must be the same"
             )
         if snapshot.owner is not self._token and not snapshot.portable:
             raise SnapshotError(
-                f"the snapshot at t = {snapshot.time:g} s serves only the simulation that it was taken from: "
+                f"the snapshot at t = {snapshot.time:g} s can be restored only in its own simulation: "
                 f"{self._unable('can_serialise')} cannot serialise its state"
             )
         self._begun()
@@ -353,16 +353,16 @@ class Simulation:
         self._signals.clear()
 
     def branch(self) -> Simulation:
-        """Return a second simulation at the same point, which goes its own way.
+        """Return a second simulation at the same point, which runs independently of this one.
 
         Raises SnapshotError, naming the FMUs, when they cannot serialise their state, or crash when
-        they take it over in another process.
+        it is restored in another process.
         """
         snapshot = self.snapshot()
         if not snapshot.portable:
             raise SnapshotError(
                 f"{self._unable('can_serialise')} cannot serialise its state (canSerializeFMUState), "
-                "which a second simulation needs; snapshot and restore serve within one simulation"
+                "which a second simulation needs; within one simulation, use snapshot and restore"
             )
         other = Simulation._planned(self.system, self.plan)
         try:
@@ -373,9 +373,9 @@ class Simulation:
             if not crashed:
                 raise
             raise SnapshotError(
-                f"{error}\nthe bytes that {crashed} gives of its state do not serve in another process, "
-                "perhaps because they contain addresses; for a branch, load it without isolated=True; "
-                "this simulation goes on"
+                f"{error}\nthe serialised state of {crashed} cannot be restored in another process, perhaps "
+                "because it contains addresses; for a branch, load the FMU without isolated=True; "
+                "this simulation can go on"
             ) from error
         except BaseException:
             other.close()
@@ -400,7 +400,9 @@ class Simulation:
         self._check_open(what)
         if self._incomplete:
             why = self._ended or "it ended within a step"
-            raise SimulationError(f"this simulation cannot {what}: {why}; restore a snapshot, or start anew")
+            raise SimulationError(
+                f"this simulation cannot {what}: {why}; restore a snapshot, or make a new simulation"
+            )
 
     # ---------------------------------------------------------------------------- ends
 

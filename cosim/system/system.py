@@ -9,8 +9,8 @@ A port is named `participant.port`; elements of an array count from 1, as in Mod
 and in FMU variable names: `building.accel[3]`, `building.accel[2:4]`. Everything that
 can be checked without time is checked here.
 
-Strings and binary data are handed on as numbers are: read at t_k, set before the step from
-t_k. A String goes to a String, a Binary to a Binary, one value each.
+Strings and binary data are passed on like numbers: read at t_k, set before the step from t_k.
+A String goes to a String, a Binary to a Binary, one value each.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class System:
             )
             raise WiringError(f"'{name}' is {component!r}, which cannot take part in a system; give {wanted}")
         if name in self.participants:
-            raise WiringError(f"the system has a participant '{name}' already; choose another name")
+            raise WiringError(f"the system already has a participant '{name}'; choose another name")
         if any(component is other for other in self.participants.values()):
             raise WiringError(f"'{name}' is the same object as another participant; make a second one")
         self.participants[name] = component
@@ -132,7 +132,7 @@ class System:
             if other.target.first < into.first + into.count and into.first < (
                 other.target.first + other.target.count
             ):
-                raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
+                raise WiringError(f"{into} is already connected to {other.source}; an input has one source")
         if out.kind == "number":
             scale, offset = _factors(out, into, transformation)
             self._append(self.connections, Connection(out, into, scale, offset, _initial(out, initial)))
@@ -140,8 +140,8 @@ class System:
             self._append(self.text_connections, Connection(out, into))
         else:
             raise WiringError(
-                f"{out} -> {into}: a {out.kind} cannot be delayed or transformed; leave initial and "
-                "transformation out"
+                f"{out} -> {into}: a {out.kind} cannot be delayed or transformed; leave out initial and "
+                "transformation"
             )
 
     def _append(self, connections: list[Connection], connection: Connection) -> None:

@@ -1,4 +1,4 @@
-"""Sampled coupling: what a real controller does. Inputs are held over a communication step.
+"""Sampled coupling, as with a digital controller: inputs are held over a communication step.
 
     at t_k      outputs of FMUs and Continuous participants, the result of the inputs held over
                 [t_{k-1}, t_k]; blocks that are due, in the order of their connections; record

@@ -1,4 +1,4 @@
-"""Which outputs depend on which inputs: exact on small kernels, never less than what numbers show."""
+"""Feedthrough: exact on small kernels, and never less than numerical differences show."""
 
 from __future__ import annotations
 

@@ -302,7 +302,7 @@ def test_aliases_are_names_of_one_variable(probes):
     """Two names of an output are two ports; two names of an input are one, which has one source."""
     system = System({"r": Ramp(), "p": FMU(probes["3.0"])})
     system.connect("r.u", "p.r_other")
-    with pytest.raises(WiringError, match=r"p\.r_in is connected already"):
+    with pytest.raises(WiringError, match=r"p\.r_in is already connected"):
         system.connect("r.u", "p.r_in")
     result = simulate(system, step=H, stop=4 * H)
     assert list(result["p.r_out"][1:]) == list(2.0 * result["r.u"][:-1])

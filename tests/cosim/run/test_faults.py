@@ -1,4 +1,4 @@
-"""What goes wrong in a run: who, where, when, why; and what was computed until then is kept."""
+"""Faults in a run: the error names participant, place, time and cause, and keeps the signals until then."""
 
 from __future__ import annotations
 
@@ -280,7 +280,7 @@ SIGNAL = """
 
 @pytest.mark.parametrize("compiled", [True, False])
 def test_ctrl_c_stops_a_run(compiled):
-    """A process of its own gets the signal; its run alone would take hours.
+    """A separate process gets the signal; its run would otherwise take hours.
 
     In callbacks Python would print the exception and run on.
     """
@@ -326,7 +326,7 @@ def test_a_linear_continuous_that_is_not_linear_is_refused(kind):
 
 
 class Remembers(Block):
-    """Python attributes beside the declared variables."""
+    """Python attributes besides the declared variables."""
 
     compiled = False
     y = Output()

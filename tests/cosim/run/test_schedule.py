@@ -1,4 +1,4 @@
-"""The schedule as text: what happens at a communication point, in which order."""
+"""The schedule as text: the operations at a communication point, in their order."""
 
 from __future__ import annotations
 
@@ -221,7 +221,7 @@ def test_statistics_and_records_come_after_the_blocks():
 
 
 class Quotient(Continuous):
-    """x' = -x, y = x / u: no number before u is there"""
+    """x' = -x, y = x / u: not a number before u is set"""
 
     u = Input()
     x = State(2.0)

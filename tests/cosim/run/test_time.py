@@ -1,4 +1,4 @@
-"""Time is the integer k: what runs when, with which t, and which sample it sees."""
+"""Time is the integer k: the order of the calls, the t of each call, and the sample that it sees."""
 
 from __future__ import annotations
 

@@ -82,9 +82,9 @@ def test_what_is_no_system_is_refused():
 
 def test_an_input_has_one_source():
     system = System({"a": Three(), "b": Three(), "ramp": Ramp()}, [("a.y[1:2]", "b.x[2:3]")])
-    with pytest.raises(WiringError, match=r"b\.x is connected already, to a\.y\[1:2\]"):
+    with pytest.raises(WiringError, match=r"b\.x is already connected to a\.y\[1:2\]"):
         system.connect("ramp.u", "b.x")
-    with pytest.raises(WiringError, match=r"b\.x\[3\] is connected already"):
+    with pytest.raises(WiringError, match=r"b\.x\[3\] is already connected"):
         system.connect("ramp.u", "b.x[3]")
     system.connect("ramp.u", "b.x[1]")
 
@@ -161,7 +161,7 @@ def test_units_that_do_not_fit_are_refused(source, target, words):
 
 
 @given(text=st.text(alphabet="ab.xyM[]:,0123 -é", max_size=14))
-def test_any_text_is_a_port_or_an_error_of_ours(text):
+def test_any_text_is_a_port_or_a_cosim_error(text):
     system = System({"a": Three(), "b": Gain()})
     for direction in ("input", "output"):
         try:
@@ -237,5 +237,5 @@ def test_a_participant_stands_in_a_system_once():
     gain = Gain()
     with pytest.raises(WiringError, match="'b' is the same object"):
         System({"a": gain, "b": gain})
-    with pytest.raises(WiringError, match="'a' already"):
+    with pytest.raises(WiringError, match="already has a participant 'a'"):
         System({"a": gain}).add("a", Gain())
