@@ -47,7 +47,7 @@ class SnapshotError(CosimError):
 
 
 class SimulationEndedWarning(UserWarning):
-    """A participant asked to end the run before its stop time: a normal end; see `Result.ended`."""
+    """A component asked to end the run before its stop time: a normal end; see `Result.ended`."""
 
 
 class CompiledKernelsWarning(UserWarning):

@@ -47,6 +47,6 @@ class Component(Protocol):
     def ports(self, direction: Direction) -> Mapping[str, Port]:
         """Return the ports that can be set ("input") or read ("output", states included), by name.
 
-        Each port is whole (all of its values, no participant). Two names of one port, such as
+        Each port is whole (all of its values, no component). Two names of one port, such as
         the aliases of FMI 3.0, lead to the same port, which has one of them.
         """

@@ -101,24 +101,21 @@ class _Flow(ast.NodeVisitor):
         self.stored |= self.names(node.target)
         self.generic_visit(node)
 
-    def visit_NamedExpr(self, node: ast.NamedExpr) -> None:
-        self.assign([node.target], node.value)
-        self.generic_visit(node)
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
+    def _single(self, node: ast.NamedExpr | ast.AnnAssign) -> None:
         if node.value is not None:
             self.assign([node.target], node.value)
         self.generic_visit(node)
+
+    visit_NamedExpr = visit_AnnAssign = _single
 
     def visit_For(self, node: ast.For) -> None:
         self.assign([node.target], node.iter)
         self._under(node.iter, node)
 
-    def visit_While(self, node: ast.While) -> None:
+    def _tested(self, node: ast.While | ast.If) -> None:
         self._under(node.test, node)
 
-    def visit_If(self, node: ast.If) -> None:
-        self._under(node.test, node)
+    visit_While = visit_If = _tested
 
     def _under(self, condition: ast.expr, node: ast.AST) -> None:
         self.conditions.append(self.names(condition))

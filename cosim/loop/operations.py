@@ -35,7 +35,7 @@ class Operation(ABC):
     text
         its line in the schedule; "" shows none
     participant
-        the participant that it belongs to
+        the component that it belongs to
     every
         it runs at every n-th communication point
     fraction

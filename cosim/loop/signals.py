@@ -23,7 +23,7 @@ KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctype
 
 
 class EndOfRun(Exception):
-    """A participant asks, inside a step, to end the run: a normal end, but the step is not completed."""
+    """A component asks, inside a step, to end the run: a normal end, but the step is not completed."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -35,11 +35,11 @@ class RunSignals:
 
     def __init__(self) -> None:
         self.exception: BaseException | None = None
-        #: the participant that raised it, and when
+        #: the component that raised it, and when
         self.place = ""
         #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
         self.interrupted = False
-        #: the participant that asked to end the run, and when; "" while none does
+        #: the component that asked to end the run, and when; "" while none does
         self.end = ""
         #: (1,) 1 when the loop is to end at the next point
         self.stop = np.zeros(1, dtype=np.int64)
@@ -55,7 +55,7 @@ class RunSignals:
         self.end, self.stop[0] = text, bool(text)
 
     def ask_to_end(self, name: str, t: float, at_end: bool) -> None:
-        """Note that a participant asks at t to end the run.
+        """Note that a component asks at t to end the run.
 
         At the end of a step the run continues to the communication point that is reached;
         inside a step, EndOfRun leaves it.
@@ -66,7 +66,7 @@ class RunSignals:
         self.set_end(self.end or text)
 
     def note(self, exception: BaseException, name: str, t: float, when: str = "at") -> None:
-        """Keep an exception that a participant raised, for the simulation."""
+        """Keep an exception that a component raised, for the simulation."""
         self.exception, self.place = exception, f"{name} failed {when} t = {t:g} s"
 
     def error(self) -> SimulationError:

@@ -79,10 +79,10 @@ def simulate(
         called with (steps done, steps in all) about ten times a second
 
     Raises CosimError for anything that can be checked before the run, SimulationError (with
-    `result`, computed until then) when a participant fails or gives a value that is not
-    finite, Interrupted (with `result`) on Ctrl-C. A participant that asks to end the run is
+    `result`, computed until then) when a component fails or gives a value that is not
+    finite, Interrupted (with `result`) on Ctrl-C. A component that asks to end the run is
     not an error: the result up to that point is returned, `result.ended` names the
-    participant and the time, and SimulationEndedWarning is issued.
+    component and the time, and SimulationEndedWarning is issued.
     """
     plan = RunPlan(step, start, coupling, solver, record, statistics, decimation, jit, tolerance)
     plan.point(stop)  # before FMUs are loaded
@@ -170,7 +170,7 @@ class Simulation:
         #: the point that comes next, or, once its outputs have been evaluated, the present one
         self._k, self._acted = 0, False
         self._incomplete = self._closed = False
-        #: the participant that asked to end the run, and when
+        #: the component that asked to end the run, and when
         self._ended = ""
         self._token = object()
         self._first = 0
@@ -226,9 +226,9 @@ class Simulation:
     def run(self, until: float, progress: Callable[[int, int], None] | None = None) -> Result:
         """Run from the present communication point to `until`, in s; the result includes both.
 
-        Raises SimulationError (with `result`, computed until then) when a participant fails
+        Raises SimulationError (with `result`, computed until then) when a component fails
         or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C. When a
-        participant asks to end the run, the result until then is returned: `Result.ended`.
+        component asks to end the run, the result until then is returned: `Result.ended`.
         """
         last = self.plan.point(until)
         if last < self._k or (last == self._k and self._acted):
@@ -242,7 +242,7 @@ class Simulation:
             return self._last
 
     def _begun(self) -> Loop:
-        """Return the loop; the first time, compile it and initialize the participants."""
+        """Return the loop; the first time, compile it and initialize the instances."""
         if self._loop is None:
             self._incomplete = True
             self._began = time.perf_counter()
@@ -279,7 +279,7 @@ class Simulation:
                         return self._end(signals.exception.text)
                     raise self._binding.error(loop)
                 self._k = int(loop.report[1])
-                self._acted = self._k < until  # the last point, or where a participant asked to end
+                self._acted = self._k < until  # the last point, or where a component asked to end
                 if signals.end and self._acted:
                     return self._end(signals.end)
                 self._incomplete = False
@@ -298,7 +298,7 @@ class Simulation:
         return self._result()
 
     def _end(self, text: str) -> Result:
-        """Return the result of a run that a participant asked to end."""
+        """Return the result of a run that a component asked to end."""
         self._ended = text
         warnings.warn(f"{text}; the result ends there", SimulationEndedWarning, stacklevel=4)
         return self._result()
@@ -327,7 +327,7 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Return to a snapshot; results that were returned since then keep their signals.
 
-        A snapshot of another simulation is accepted if that one has the same participants and
+        A snapshot of another simulation is accepted if that one has the same components and
         options. Raises SnapshotError otherwise.
         """
         self._check_open("restore a snapshot")
@@ -335,7 +335,7 @@ class Simulation:
             raise SnapshotError(f"{snapshot!r} must be a snapshot, as `snapshot` returns it")
         if snapshot.kind != self._kind():
             raise SnapshotError(
-                f"the snapshot at t = {snapshot.time:g} s belongs to another simulation: participants, "
+                f"the snapshot at t = {snapshot.time:g} s belongs to another simulation: components, "
                 "connected and recorded ports, step, start, coupling, solver and jit must be the same"
             )
         if snapshot.owner is not self._token and not snapshot.portable:

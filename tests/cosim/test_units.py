@@ -1,4 +1,4 @@
-"""Units: which texts are units, and conversion by names and by definitions of a file's own."""
+"""Units: which texts are units, and conversion by names and by the definitions of a file."""
 
 from __future__ import annotations
 

@@ -58,12 +58,12 @@ def iterated(binding: Binding) -> Schedule:
 
 
 class Iteration:
-    """The participants that drive each other, and the solver for the values that they exchange."""
+    """The components that drive each other, and the solver for the values that they exchange."""
 
     def __init__(self, binding: Binding, coupled: list[Connection]) -> None:
         self._binding = binding
         ends = {end.participant for c in coupled for end in (c.source, c.target)}
-        #: the participants, in the order of the system
+        #: the components, in the order of the system
         self.members = {name: i for name, i in binding.instances.items() if name in ends}
         reasons = {name: i.unrepeatable for name, i in self.members.items() if i.unrepeatable}
         for reason in reasons.values():

@@ -1,4 +1,4 @@
-"""A Continuous that moves by its advance alone: sampled coupling and Co-Simulation, nothing else."""
+"""A Continuous with only an advance: sampled coupling and Co-Simulation, nothing else."""
 
 import pytest
 

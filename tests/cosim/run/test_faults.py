@@ -1,4 +1,4 @@
-"""Faults in a run: the error names participant, place, time and cause, and keeps the signals until then."""
+"""Faults in a run: the error names component, place, time and cause, and keeps the signals until then."""
 
 from __future__ import annotations
 
@@ -78,13 +78,13 @@ class Fails(Block):
     def step(self, t, h):
         self.y = self.x
         if t > 0.55:
-            raise ZeroDivisionError("by purpose")
+            raise ZeroDivisionError("on purpose")
 
 
 def test_an_exception_in_a_callback_reaches_the_caller():
     system = System({"ramp": Ramp(), "python": Fails()}, [("ramp.u", "python.x")])
     with pytest.raises(
-        SimulationError, match=r"python failed at t = 0\.6 s: ZeroDivisionError: by purpose"
+        SimulationError, match=r"python failed at t = 0\.6 s: ZeroDivisionError: on purpose"
     ) as caught:
         simulate(system, step=0.1, stop=5.0)
     cause = caught.value.__cause__
@@ -422,7 +422,7 @@ def test_values_that_do_not_fit_are_refused(values, words):
         Sized(**values)
 
 
-def test_what_is_no_participant_is_refused():
+def test_an_object_that_is_not_a_component_is_refused():
     with pytest.raises(WiringError, match=r"'control' is .* give Gain\(\.\.\.\)"):
         System({"control": Gain})
     with pytest.raises(WiringError, match="cannot take part in a system"):

@@ -112,7 +112,7 @@ def test_a_snapshot_is_returned_to_exactly_and_a_branch_goes_its_own_way(kind, c
         simulation.run(0.3)
         there = simulation.snapshot()
         first = simulation.run(0.9)
-        for _ in range(2):  # as often as one likes
+        for _ in range(2):  # any number of times
             simulation.restore(there)
             assert simulation.time == there.time == 0.3
             again = simulation.run(0.9)
@@ -206,7 +206,7 @@ def test_an_fmu_that_failed_is_taken_back(tmp_path):
         assert np.array_equal(again["r.y"], caught.value.result["r.y"][: len(again.time)])
 
 
-def test_participants_that_cannot_keep_their_state_are_named(tmp_path):
+def test_components_that_cannot_keep_their_state_are_named(tmp_path):
     system = System({"theirs": FMU(probe(tmp_path / "p.fmu", "2.0")), "m": Mass()})
     with Simulation(system, step=0.1) as simulation:
         simulation.run(0.2)
@@ -246,7 +246,7 @@ def test_without_records_there_are_no_recorded_times():
 
 
 def test_a_snapshot_of_another_simulation_is_refused(paths):
-    """Unless it has the same participants and options, so that the saved values have the same meaning."""
+    """Unless it has the same components and options, so that the saved values have the same meaning."""
 
     def standing(plant, **options) -> Simulation:
         return Simulation(System({"p": plant}), **({"step": 0.1} | options))
@@ -277,7 +277,7 @@ def test_a_snapshot_of_another_simulation_is_refused(paths):
         simulation.restore(None)
 
 
-def test_an_fmu_that_is_there_once_is_not_branched(paths, tmp_path):
+def test_an_fmu_that_can_be_instantiated_once_is_not_branched(paths, tmp_path):
     """A second simulation would be a second instance in this process."""
 
     def once(name: str, content: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""Strings and binary data while a run goes on: handed from FMU to FMU, and recorded."""
+"""Strings and binary data during a run: passed from FMU to FMU, and recorded."""
 
 from __future__ import annotations
 
