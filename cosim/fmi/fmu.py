@@ -18,6 +18,7 @@ from ..errors import FMUError, WiringError
 from ..loop.instance import Setting
 from .fmu_file import FMUFile
 from .instance.co_simulation import CoSimulationInstance
+from .instance.drivers import load
 from .instance.model_exchange import ModelExchangeInstance
 from .interfaces import CoSimulation, Interface, InterfaceName, ModelExchange, interface_of
 
@@ -142,10 +143,11 @@ class FMU(FMUFile):
         """
         if setting.is_stage:
             self.check_stage(name)
-        used, signals = set(setting.used), setting.signals
-        if self.model_exchange or (setting.is_stage and not self.as_block):
-            return ModelExchangeInstance(name, self, signals, used, self.integration, self.isolated)
-        return CoSimulationInstance(name, self, signals, used, setting.step, self.event_mode, self.isolated)
+        exchange = self.model_exchange or (setting.is_stage and not self.as_block)
+        driver = load(self, name, exchange, setting.signals, self.event_mode, self.isolated)
+        if exchange:
+            return ModelExchangeInstance(driver, setting.used, self.integration)
+        return CoSimulationInstance(driver, setting.used, setting.step)
 
     def check_stage(self, name: str) -> None:
         """Raise WiringError with the reason if the FMU cannot serve stage coupling."""
