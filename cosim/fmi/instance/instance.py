@@ -1,6 +1,6 @@
 """A running FMU: its buffers, and the operations that call its functions by address.
 
-The part that all instances share; co_simulation.py and model_exchange.py add how they advance.
+All instances share this part; co_simulation.py and model_exchange.py add the operations that advance.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class VariableGroup:
         self, access: str, number: Number, discrete: bool, clocks: frozenset[int], ports: list[FMUPort]
     ) -> None:
         self.access = access
-        #: whether they can change at events only, where there are events
+        #: whether they are set in events, where the FMU has an event mode
         self.discrete = discrete
-        #: references of the clocks at whose ticks alone they can be got and set
+        #: references of their clocks, at whose ticks alone they can be got and set
         self.clocks = clocks
         self.is_clock = access == "Clock"
         self.number = number
@@ -106,8 +106,8 @@ class FMUInstance:
                 for element, value, held in zip(x.elements, now, x.values.tolist(), strict=True):
                     if value != held and not x.number.is_float:  # NaN differs from itself
                         raise FMUError(
-                            f"{self.name}.{element} starts with {value}, which is above 2^53, and a float "
-                            "does not hold it; do not connect or record it"
+                            f"{self.name}.{element} starts with {value}, which is above 2^53 and does not "
+                            "fit a float; do not connect or record it"
                         )
 
     def _settle(self, t0: float) -> None:
@@ -154,7 +154,7 @@ class FMUInstance:
 
     @property
     def can_serialise(self) -> bool:
-        """Whether the FMU can give its state as bytes."""
+        """Whether the FMU can serialise its state to bytes."""
         return bool(self.can_save and self.driver.interface.canSerializeFMUstate)
 
     @property
@@ -281,7 +281,7 @@ class FMUInstance:
 
     def _get_texts(self, t: float, h: float) -> None:
         for name in self.texts:
-            v = self.fmu.text_outputs[name]
+            v = self.fmu.variables[name]
             empty: Any = "" if v.type == "String" else b""
             self.texts[name] = self.driver.get(v.type, [v.valueReference], 1)[0] or empty
 
@@ -293,7 +293,7 @@ class FMUInstance:
 
     def _set_texts(self, texts: Mapping[str, Any]) -> None:
         for name, text in texts.items():
-            self.driver.set(self.fmu.text_inputs[name], [text])
+            self.driver.set(self.fmu.variables[name], [text])
         self.sent_texts.update(texts)
 
     # ----------------------------------------------------------------------- questions
