@@ -17,7 +17,6 @@ from os import PathLike
 from pathlib import Path
 
 from ..errors import CosimError, FMUError, did_you_mean
-from ..fmi.file.archive import Archive
 from ..fmi.fmu import FMU
 from . import misuse, probes
 from .report import Finding, Report
@@ -73,8 +72,6 @@ def examine(
             raise CosimError(f"probe '{name}' does not exist" + did_you_mean(name, [p.name for p in PROBES]))
     try:
         fmu = FMU(path)
-        with Archive(path) as archive:
-            platforms = archive.platforms()
     except FMUError as error:
         return Report(path.name, "not usable here", (Finding("file", "", "error", str(error)),))
     has = {"": True, "Co-Simulation": fmu.has_cs, "Model Exchange": fmu.has_me}
@@ -86,14 +83,15 @@ def examine(
         found = [
             pool.submit(_probed, path, *job, Path(folder) / str(i), time_limit) for i, job in enumerate(jobs)
         ]
-        findings = [_platforms(platforms), *(f.result() for f in found)]
+        findings = [_platforms(fmu), *(f.result() for f in found)]
     tool = fmu.description.generationTool
     kinds = " and ".join(i for i in _INTERFACES if has[i])
     about = f"FMI {fmu.description.fmiVersion}, {kinds}" + (f", made by {tool}" if tool else "")
     return Report(path.name, about, tuple(findings))
 
 
-def _platforms(platforms: list[str]) -> Finding:
+def _platforms(fmu: FMU) -> Finding:
+    platforms = sorted(folder.name for folder in (fmu.directory / "binaries").iterdir() if folder.is_dir())
     text = f"binaries for {', '.join(platforms)}"
     return Finding("platforms", "", "note" if len(platforms) == 1 else "ok", text)
 

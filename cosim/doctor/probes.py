@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import CosimError, WiringError
 from ..fmi.fmu import FMU
-from ..fmi.ports import FMUPort, unit_definitions, unit_of
+from ..fmi.ports import unit_definitions
 from ..loop.instance import buffer
 from ..units import parse
 from .memory import handles, memory
@@ -59,9 +59,10 @@ def validity(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     """Real inputs and outputs have units that can be converted."""
     doing("read the units")
-    kinds = {n: p for n, p in {**fmu.input_ports, **fmu.output_ports}.items() if _is_real(fmu, p)}
-    ends = {n: p for n, p in kinds.items() if p.variables[0].causality in ("input", "output")}
-    without = [n for n, p in ends.items() if unit_of(p.variables[0]) is None]
+    ports = {**fmu.input_ports, **fmu.output_ports}
+    reals = {n: p for n, p in ports.items() if fmu.version.numbers[p.type][1].is_float}
+    ends = {n: p for n, p in reals.items() if p.variables[0].causality in ("input", "output")}
+    without = [n for n, p in ends.items() if p.unit is None]
     unknown = set()
     for unit in {p.unit for p in ends.values()} - {None} - unit_definitions(fmu.description).keys():
         try:
@@ -74,10 +75,6 @@ def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     if unknown:
         parts.append(f"not known, so not converted: {named(sorted(unknown))}")
     return ("note", "; ".join(parts)) if parts else ("ok", f"{len(ends)} inputs and outputs have one")
-
-
-def _is_real(fmu: FMU, port: FMUPort) -> bool:
-    return fmu.version.numbers[port.type][1].is_float
 
 
 # ------------------------------------------------------------------------- its instances

@@ -11,11 +11,6 @@ from dataclasses import asdict, dataclass
 LEVELS: Mapping[str, int] = {"ok": 0, "note": 0, "warning": 1, "error": 2, "crashed": 3}
 
 
-def worst(levels: list[str]) -> str:
-    """Return the worst of the levels, "ok" if there are none."""
-    return max(levels, key=list(LEVELS).index, default="ok")
-
-
 @dataclass(frozen=True)
 class Finding:
     """The finding of one probe, which is one line of the report."""
@@ -39,7 +34,7 @@ class Report:
     @property
     def worst(self) -> str:
         """The level of the worst finding."""
-        return worst([f.level for f in self.findings])
+        return max((f.level for f in self.findings), key=list(LEVELS).index)
 
     @property
     def exit_code(self) -> int:

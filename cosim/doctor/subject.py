@@ -144,10 +144,6 @@ class Subject:
         """Refuse to end the run."""
         raise FMUError(f"it asks to end the simulation at t = {t:g} s")
 
-    def is_interrupted(self) -> bool:
-        """Return False: Ctrl-C ends the process."""
-        return False
-
     def _discrete_states(self, t: float) -> None:
         if self.driver.update_discrete_states(t):
             raise FMUError("it asks to end the simulation in an event")

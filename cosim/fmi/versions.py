@@ -22,7 +22,7 @@ class Version:
         by numeric type: its part of the function names (fmi2GetReal, fmi3GetFloat64), and its
         representation in memory
     get_derivatives
-        the name of the function that gets the derivatives of the states
+        the name, without prefix, of the function that gets the derivatives of the states
     update_discrete_states
         FMPy's name of the function that updates the discrete states
     values
@@ -54,7 +54,7 @@ FMI2 = Version(
         "Enumeration": ("Integer", NUMBERS["Int32"]),
         "Boolean": ("Boolean", Number("i32", "int32", 0, 1)),
     },
-    get_derivatives="fmi2GetDerivatives",
+    get_derivatives="GetDerivatives",
     update_discrete_states="newDiscreteStates",
     values=FMI2Values,
     flag="int32",
@@ -68,7 +68,7 @@ FMI3 = Version(
         "Boolean": ("Boolean", Number("i8", "uint8", 0, 1)),
         "Clock": ("Clock", NUMBERS["Float64"]),  # of its port; its start value is an interval
     },
-    get_derivatives="fmi3GetContinuousStateDerivatives",
+    get_derivatives="GetContinuousStateDerivatives",
     update_discrete_states="updateDiscreteStates",
     values=FMI3Values,
     flag="uint8",

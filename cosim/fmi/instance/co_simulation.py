@@ -49,7 +49,7 @@ class CoSimulationInstance(EventInstance):
         common: dict[str, Any] = {
             "text": f"{self.name}: step (FMU)",
             "participant": self.name,
-            "function": self._function(f"{self.fmu.version.prefix}DoStep"),
+            "function": self.driver.address("DoStep"),
             "component": self._component,
         }
         answer = self.driver.answer

@@ -15,6 +15,7 @@ make the calls that differ between the versions. The order of calls:
 
 from __future__ import annotations
 
+import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
@@ -74,11 +75,6 @@ class StepAnswer:
         """Return the time at which a step until `until` ended."""
         return min(float(self.times[0]), until) if self.flags[1:].any() else until
 
-    def take(self, event: bool, terminate: bool, early: bool, last: float) -> None:
-        """Keep what FMPy's doStep returned."""
-        self.flags[:] = event, terminate, early
-        self.times[0] = last
-
 
 class Interrupts(Protocol):
     """The owner of a driver, which acts when a step is interrupted; times in s."""
@@ -88,9 +84,6 @@ class Interrupts(Protocol):
 
     def end_run(self, t: float, at_end: bool) -> None:
         """Note that the FMU asks at t to end the run."""
-
-    def is_interrupted(self) -> bool:
-        """Return whether Ctrl-C was pressed."""
 
 
 class Driver(ABC):
@@ -166,14 +159,15 @@ class Driver(ABC):
     def _load(self, library: Path) -> None:
         identifier, fmi = self.interface.modelIdentifier, self.VERSION.prefix
         kind = f"FMU{fmi[-1]}{'Model' if self.model_exchange else 'Slave'}"
+        made = getattr(import_module(f"fmpy.{fmi}"), kind)  # not in the folder of an untrusted FMU
         try:
             if self.isolated:
                 self.process = Isolation(self.name, library, self.signals)
-                # FMPy joins it to the folder of binaries: joined to an absolute path, the folder vanishes
+                # FMPy joins it to the folder of binaries, which an absolute path replaces
                 identifier = str(support_library().with_suffix(""))
             # FMPy changes to the library's folder, a property of the process, and stays there if it fails
             with _LOADING, chdir(self.file.directory):
-                self.api: Any = getattr(import_module(f"fmpy.{fmi}"), kind)(
+                self.api: Any = made(
                     guid=self.file.description.guid,
                     unzipDirectory=str(self.file.directory),
                     modelIdentifier=identifier,
@@ -209,10 +203,16 @@ class Driver(ABC):
         if self.process is not None:
             self.process.close()
 
-    def function(self, name: str) -> Any:
-        """Return the function of FMI that the compiled loop calls."""
+    def address(self, name: str, in_loop: bool = True) -> int:
+        """Return the address of a function of FMI, given its name without prefix.
+
+        `in_loop` selects the functions of an isolated FMU that only the loop of a run may call.
+        """
+        name = self.VERSION.prefix + name
         function = getattr(self.api.dll, name)
-        return function if self.process is None else getattr(self.api.dll, f"loop_{name}", function)
+        if in_loop and self.process is not None:
+            function = getattr(self.api.dll, f"loop_{name}", function)
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def initialize(
         self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
@@ -290,7 +290,8 @@ class Driver(ABC):
         """Do one step from t over h, in s; from FMI 3.0 on it may return early, as `answer` then states."""
         done = self.attempt("do its step", self.api.doStep, t, h, False)
         if self.answer is not None:
-            self.answer.take(*done)
+            self.answer.flags[:] = done[:3]
+            self.answer.times[0] = done[3]
 
     def finish_step(self, t: float, h: float, owner: Interrupts) -> None:
         """Continue a step over [t, t + h] from its answer until its end.
@@ -311,7 +312,7 @@ class Driver(ABC):
             if now >= end - near:
                 answer.flags[:] = 0
                 return
-            if owner.is_interrupted():
+            if self.signals.interrupted:
                 raise KeyboardInterrupt
             event = float(self.event_time[0])
             # a time event at the end of the step, to rounding, is handled at its own instant

@@ -100,10 +100,6 @@ class EventInstance(FMUInstance):
         """Note that the FMU asks at t to end the run."""
         self.signals.ask_to_end(self.name, t, at_end)
 
-    def is_interrupted(self) -> bool:
-        """Return whether Ctrl-C was pressed."""
-        return self.signals.interrupted
-
     def _start_events(self, t0: float) -> None:
         """Handle the events of the start."""
         if self._discrete_states(t0):

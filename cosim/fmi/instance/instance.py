@@ -5,7 +5,6 @@ All instances share this part; co_simulation.py and model_exchange.py add the op
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
 from functools import partial
@@ -214,9 +213,6 @@ class FMUInstance:
 
     # ---------------------------------------------------------------------- operations
 
-    def _function(self, name: str) -> int:
-        return ctypes.cast(self.driver.function(name), ctypes.c_void_p).value or 0
-
     @property
     def _component(self) -> int:
         component = self.api.component
@@ -237,7 +233,7 @@ class FMUInstance:
 
     def _values(self, what: str, x: VariableGroup, finite: bool = False) -> Operation:
         return self.fmu.version.values(
-            function=self._function(f"{self.fmu.version.prefix}{what}{x.access}"),
+            function=self.driver.address(f"{what}{x.access}"),
             component=self._component,
             references=int(x.references.ctypes.data),
             values=int(x.raw.ctypes.data),

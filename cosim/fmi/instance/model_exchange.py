@@ -102,7 +102,7 @@ class ModelExchangeInstance(EventInstance):
 
     def _vector(self, name: str, address: int) -> Operation:
         return Vector(
-            function=self._function(name),
+            function=self.driver.address(name),
             component=self._component,
             values=address,
             count=self.n_states,
@@ -111,16 +111,16 @@ class ModelExchangeInstance(EventInstance):
 
     def set_states(self, fraction: float, substeps: int = 1) -> list[Operation]:
         """Set time and states."""
-        prefix = self.fmu.version.prefix
         time = SetTime(
-            function=self._function(f"{prefix}SetTime"),
+            function=self.driver.address("SetTime"),
             component=self._component,
             fraction=fraction,
             substeps=substeps,
             participant=self.name,
         )
-        states = f"{prefix}SetContinuousStates"
-        return [time, self._vector(states, self.state_address)] if self.n_states else [time]
+        if not self.n_states:
+            return [time]
+        return [time, self._vector("SetContinuousStates", self.state_address)]
 
     def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Get the derivatives into `target`."""
@@ -131,7 +131,7 @@ class ModelExchangeInstance(EventInstance):
         self.event_address = self.event_address or self.signals.callback(self.name, self._handle_events)
         # always, even if the model states that it need not be told: FMPy reads that flag inverted
         completed = CompletedStep(
-            function=self._function(f"{self.fmu.version.prefix}CompletedIntegratorStep"),
+            function=self.driver.address("CompletedIntegratorStep"),
             component=self._component,
             flags=int(self.flags.ctypes.data),
             event_time=int(self.event_time.ctypes.data),
@@ -197,7 +197,7 @@ class ModelExchangeInstance(EventInstance):
         elif due < t - SLACK * h:
             self._warn_late(
                 f"a time event at t = {due:g} s, inside the step to t = {t:g} s, which is handled at its "
-                "end: stage coupling has one step for all participants; choose a step that meets the event, "
+                "end: stage coupling has one step for all components; choose a step that meets the event, "
                 "or sampled coupling"
             )
         changed = bool((signs != self.signs).any())

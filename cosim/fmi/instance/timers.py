@@ -28,9 +28,6 @@ class Timers:
         #: reference, and interval and shift in steps, of each clock
         self._timers: list[tuple[int, int, int]] = []
 
-    def __bool__(self) -> bool:
-        return bool(self._clocks)
-
     def start(self, t0: float, given: Mapping[str, list[Any]]) -> None:
         """Determine the intervals, in initialization mode."""
         self._start = t0
