@@ -51,9 +51,8 @@ def fmu_parts(system: System, fmi_version: str, platforms: list[str] | None) -> 
             part = Part(name, member, file.read_bytes(), read_description(file))
             part.source = sources.setdefault(hashlib.sha256(part.file).digest(), f"{name}.fmu")
             if isinstance(member, FMU):
-                texts = member.text_inputs | member.text_outputs
                 part.ports = member.input_ports | member.output_ports
-                part.ports |= {n: FMUPort(n, (), None, v.type, (v,)) for n, v in texts.items()}
+                part.ports |= member.text_inputs | member.text_outputs
             else:
                 part.ports = ports(part.description.modelVariables, part.shape)
             parts[name] = part
