@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from controllers.design.state_space import first_order
+from controllers.design.design_model import first_order
 from cosim import Array, System, simulate
 from fmus.export import as_fmu
 from fmus.kernels.coupled_modes import coupled_modes
