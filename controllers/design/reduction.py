@@ -26,7 +26,7 @@ are displacements R x, then absolute accelerations S (x'' + I a_g), which carry 
 
 Sources: R. J. Guyan, Reduction of stiffness and mass matrices, AIAA Journal 3 (1965) 380,
 DOI 10.2514/3.2874. E. J. Davison, A method for simplifying linear dynamic systems, IEEE
-Transactions on Automatic Control 11 (1966) 93-101, DOI 10.1109/TAC.1966.1098264.
+Transactions on Automatic Control 11 (1966) 93-101.
 """
 
 from __future__ import annotations

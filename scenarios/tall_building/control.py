@@ -133,7 +133,7 @@ def add_controller(system: System, controller: Controller, model: DesignModel, a
 def _gain_law(controller: Controller) -> Block:
     """Return a gain law of chapter 4; its M is a rate of s here, m/s^2, and a force in chapter 4."""
     if controller == "algorithm-1":
-        return AlgorithmI(M=0.1, M_min=0.001)
+        return AlgorithmI(M=0.1, M_min=0.001, unit="m/s^2")
     if controller == "algorithm-2":
-        return AlgorithmII(M=0.1, alpha=0.05, beta=0.5, M1=0.001, M2=0.3)
-    return EquivalentControlGain(M_0=0.1, tau=0.1)
+        return AlgorithmII(M=0.1, alpha=0.05, beta=0.5, M1=0.001, M2=0.3, unit="m/s^2")
+    return EquivalentControlGain(M_0=0.1, tau=0.1, unit="m/s^2")
