@@ -21,7 +21,7 @@ from fmpy import read_model_description, simulate_fmu
 from cosim import Array, Continuous, Input, Output, State
 from fmus.export import export
 from tests.fmus.export.host import ERROR, OK, Accumulator, building, convert
-from tests.fmus.export.test_trajectories import EXACT, linear_building, linear_oscillator, relative
+from tests.fmus.export.linear import EXACT, linear_building, linear_oscillator, relative
 
 LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 CS, ME = "CoSimulation", "ModelExchange"

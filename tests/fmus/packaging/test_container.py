@@ -18,8 +18,7 @@ from fmus.export import ExportError, export
 from fmus.packaging.container import export_container
 from fmus.plants.oscillator import Oscillator
 from scenarios.chattering.study import Study
-from tests.fmus.packaging.ssp_parts import Damper, Frame, Watch
-from tests.fmus.packaging.test_ssp_elsewhere import Brake, at_rest, frame
+from tests.fmus.packaging.ssp_parts import Brake, Damper, Frame, Watch, at_rest, frame
 
 H, STOP = 0.005, 1.0
 
