@@ -72,6 +72,8 @@ class Participant:
     CACHE_KEYS: ClassVar[tuple[str, ...]] = ()
     #: sizes by name, for those that neither a keyword nor an array gives
     DEFAULT_SIZES: ClassVar[Mapping[str, int]] = {}
+    #: units by name, for those that no keyword gives
+    DEFAULT_UNITS: ClassVar[Mapping[str, str]] = {}
     #: the contract of a component, see component.py
     as_block: bool = False
     every: int | None = None
@@ -129,7 +131,7 @@ class Participant:
 
     def __init__(self, **values: Any) -> None:
         sizes = self._sizes(values)
-        units = {name: values.get(name) for name in self._unit_names}
+        units = {name: values.get(name, self.DEFAULT_UNITS.get(name)) for name in self._unit_names}
         for name, unit in units.items():
             if not isinstance(unit, (str, NoneType)):
                 raise DeclarationError(f"{type(self).__name__}: {name}={unit!r} must be a unit, such as 'N'")

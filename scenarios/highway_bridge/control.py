@@ -24,8 +24,8 @@ from typing import Literal
 import numpy as np
 
 from controllers.adaptive.scwnn import SCWNN
+from controllers.design.design_model import DesignModel
 from controllers.design.reduction import modal_state_space
-from controllers.design.state_space import StateSpace
 from controllers.laws.state_feedback import StateFeedback
 from controllers.laws.viscous_dampers import ViscousDampers
 from controllers.observers.kinematic_observer import KinematicObserver
@@ -183,7 +183,7 @@ def _lqg(system: System, bridge: NonlinearStructure, seed: int) -> None:
     R = np.eye(BEARINGS) / LIMIT**2
     feedback = StateFeedback.lqr(model, seen.T @ weight @ seen, R)
     measured = list(LQG_SENSORS)
-    sensed = StateSpace(
+    sensed = DesignModel(
         A=model.A, B=model.B, E=np.hstack([model.E, model.B]),
         C=model.C[measured], D=model.D[measured], F=np.hstack([model.F, model.D])[measured],
     )  # fmt: skip

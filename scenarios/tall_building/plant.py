@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from controllers.design.state_space import StateSpace
+from controllers.design.design_model import DesignModel
 from cosim import Array, CosimError, Result, System, simulate
 from fmus.loads.wind import FloorLoad, across_wind, load_forces
 from fmus.plants.modal_structure import ModalStructure
@@ -43,7 +43,7 @@ def load(wind: str | None, seed: int, duration: float, floors: int) -> tuple[Arr
 
 
 @lru_cache(maxsize=4)
-def model_of(data: str | None) -> StateSpace:
+def model_of(data: str | None) -> DesignModel:
     """Return the model on which the controllers are designed."""
     return reduced_model(building(data))
 

@@ -15,7 +15,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ...arrays import Array
 from ...core.tableaus import TABLEAUS
 from ...loop.operations import SLACK
 from ...result import SimulationError

@@ -10,7 +10,7 @@ from cosim import FMU, FMUError, SimulationError
 from cosim.fmi.instance.continuous_time import ContinuousTime
 from cosim.fmi.instance.drivers import load
 from cosim.loop.signals import RunSignals
-from tests.cosim.fmi.isolation.test_isolation import crash
+from tests.cosim.fmi.crash import crash
 from tests.cosim.fmi.probe import probe
 
 
