@@ -14,11 +14,7 @@ from .bridge import EI, M_Y, SEGMENT
 from .criteria import BEARINGS, curvatures, moments
 
 #: ports of the bearings' displacements, and what they are of
-COMPARED = {
-    "none.deformation": "without control",
-    "lqg.deformation": "LQG",
-    "bridge.deformation": "this run",
-}
+COMPARED = {"none.deformation": "without control", "lqg.deformation": "LQG", "bridge.deformation": "this run"}
 
 
 def figures(result: Result) -> dict[str, Figure]:
