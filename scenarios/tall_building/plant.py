@@ -1,4 +1,4 @@
-"""Building and wind of chapter 2, and the response without control; each is computed once per process."""
+"""Building and wind of chapter 2, and the response without control, each computed once per process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fmus.structures.structure import Structure
 
 from .building import STORY_HEIGHTS, default_building, load_building
 from .control import PERIOD, reduced_model
-from .criteria import FLOORS, Reference
+from .criteria import FLOORS
 
 DURATION = 900.0
 """Length of a run, s."""
@@ -60,9 +60,3 @@ def uncontrolled(data: str | None, wind: str | None, seed: int, duration: float)
     step = PERIOD * LOAD_EVERY
     ports = ["tower.x", "tower.a"]
     return simulate(system, step=step, stop=duration, record=ports, decimation=10)
-
-
-def reference(data: str | None, wind: str | None, seed: int, duration: float) -> Reference:
-    """Return the response without control to which the criteria refer."""
-    statistics = uncontrolled(data, wind, seed, duration).statistics
-    return Reference.of(statistics["tower.x"], statistics["tower.a"])
