@@ -27,6 +27,7 @@ from platformdirs import user_cache_path
 
 from ..core.participant import Participant
 from ..errors import CompilationError, CosimError
+from .names import check_names
 
 _LIBRARIES = {"numpy", "math", "numba", "scipy", "llvmlite", "builtins"}
 
@@ -300,6 +301,7 @@ def lower(participant: Participant) -> str:
 def _lower_kernels(participant: Participant) -> str:
     import numba
 
+    check_names(participant)
     storage = numba.from_dtype(participant.dtype)
     memo: dict[Any, Any] = {}
     linked = None
