@@ -49,17 +49,12 @@ class Binding:
         names: dict[str, set[str]] = defaultdict(set)
         for port in [*used, *ends, *(c.source for c in system.text_connections)]:
             names[port.participant].add(port.name)
+        is_stage = plan.coupling == "continuous"
         try:
             for name, component in components.items():
                 every = self.every.get(name)
-                setting = Setting(
-                    step=plan.step * (every or 1),
-                    every=every,
-                    is_stage=plan.coupling == "continuous",
-                    jit=plan.jit,
-                    used=names[name],
-                    signals=self.signals,
-                )
+                step = plan.step * (every or 1)
+                setting = Setting(step, every, is_stage, plan.jit, names[name], self.signals)
                 self.instances[name] = _instance(name, component, setting)
             for c in system.text_connections:
                 target = self.instances[c.target.participant]
