@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import CompilationError
-from .kernels import cache_directory, write_atomically
+from .kernels import cache_directory, cached
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,7 @@ def cached_library(parts: Iterable[str], suffix: str, build: Callable[[], bytes]
     if importlib.util.find_spec("ziglang") is None:
         raise CompilationError("no C compiler: the package ziglang is not installed; pip install ziglang")
     key = hashlib.sha256("\0".join([*parts, importlib.metadata.version("ziglang")]).encode()).hexdigest()
-    cached = cache_directory() / "libraries" / f"{key}{suffix}"
-    if not cached.exists():
-        write_atomically(cached, build())
-    return cached
+    return cached(f"libraries/{key}{suffix}", build)
 
 
 def zig_cc(arguments: Sequence[str | Path], folder: Path) -> subprocess.CompletedProcess[str]:

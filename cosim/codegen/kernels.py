@@ -1,10 +1,10 @@
-"""From kernels to machine code: Numba -> LLVM IR -> stripped -> address, cached on disk.
+"""From kernels to machine code: Numba -> LLVM IR -> stripped IR -> address, cached on disk.
 
-The loop loads the stripped IR, and the exporter links it into an FMU: one text, so both
-compute the same. It depends on libm only. Numba is imported when a kernel is compiled for
-the first time; afterwards its IR comes from the cache, which is keyed by everything that
-the code depends on: source code of the kernels and of every function that they call,
-layout of the storage, versions of the tools.
+The loop loads the stripped IR, and the exporter links the same text into an FMU, so that both
+compute the same. The IR depends on libm only. Numba is imported when a kernel is compiled for
+the first time; afterwards its IR comes from the cache. The key covers everything that the code
+depends on: source code of the kernels and of every function that they call, layout of the
+storage, versions of the tools.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def cache_directory() -> Path:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that another process sees either all of it or none."""
+    """Write a file so that another process sees either the whole file or none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent)
     try:
@@ -71,10 +71,18 @@ def write_atomically(path: Path, data: bytes) -> None:
         raise
 
 
+def cached(name: str, make: Callable[[], bytes]) -> Path:
+    """Return a file of the cache; make its content if it does not exist."""
+    path = cache_directory() / name
+    if not path.exists():
+        write_atomically(path, make())
+    return path
+
+
 # ------------------------------------------------------------------- fingerprint
 
 
-def _is_ours(value: Any) -> bool:
+def _is_user_function(value: Any) -> bool:
     """Tell whether a global of a kernel is a Python function that must be compiled with it."""
     return isinstance(value, types.FunctionType) and not _is_library(value.__module__ or "")
 
@@ -97,7 +105,7 @@ def _describe(value: Any, seen: dict[int, int]) -> str:
         consts = [_describe(c, seen) for c in value.co_consts]
         return f"code({value.co_code.hex()},{value.co_names},{value.co_varnames},{consts})"
     value = getattr(value, "py_func", value)  # a function under @njit
-    if _is_ours(value):
+    if _is_user_function(value):
         if id(value) in seen:
             return f"seen{seen[id(value)]}"
         seen[id(value)] = len(seen)
@@ -127,7 +135,7 @@ def _describe(value: Any, seen: dict[int, int]) -> str:
 
 @lru_cache(maxsize=1)
 def _tools() -> tuple[str, ...]:
-    """Return the versions of all that makes the code: this file, Python, the libraries, the processor."""
+    """Return the versions of everything that makes the code: this file, Python, libraries, processor."""
     versions = (version(name) for name in ("numba", "llvmlite", "numpy"))
     own = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
     return own, sys.version, *versions, llvm.get_host_cpu_name()
@@ -161,13 +169,13 @@ def _jitted(
     )
     memo[function] = _without_python(numba.njit(twin, error_model="numpy"))
     for name in _names(function.__code__):
-        if _is_ours(globals_.get(name)):
+        if _is_user_function(globals_.get(name)):
             globals_[name] = _jitted(globals_[name], kernels, memo)
     return memo[function]
 
 
 def _without_python(dispatcher: Any) -> Any:
-    """Leave out the parts that only Python needs: wrappers, and machine code for every single function.
+    """Leave out the parts that only Python needs: wrappers, and machine code for each function.
 
     These are Numba's internals; tests/cosim/codegen/test_kernels.py notices when they change.
     """
@@ -177,7 +185,7 @@ def _without_python(dispatcher: Any) -> Any:
         return flags
 
     def keep(compiled: Any) -> None:
-        compiled = compiled._replace(entry_point=object())  # by which callers look up the code
+        compiled = compiled._replace(entry_point=object())  # the key by which callers find the code
         dispatcher.targetctx.insert_user_function(compiled.entry_point, compiled.fndesc, [compiled.library])
         dispatcher.overloads[tuple(compiled.signature.args)] = compiled
 
@@ -257,7 +265,7 @@ def _stripped(module: Any, name: str) -> str:
 
 
 def check_symbols(module: Any, name: str) -> None:
-    """Refuse a kernel that needs a symbol which neither the loop nor an FMU has: they have libm only."""
+    """Refuse a kernel that needs a symbol outside libm, which neither the loop nor an FMU has."""
     for function in module.functions:
         symbol = function.name
         if function.is_declaration and not symbol.startswith("llvm.") and symbol not in LIBM:
@@ -266,22 +274,12 @@ def check_symbols(module: Any, name: str) -> None:
             raise CompilationError(f"{name} needs '{symbol}', which compiled code does not have: {why}")
 
 
-@lru_cache(maxsize=1)
-def _target_machine() -> Any:
+def _target_machine(jit: bool = False) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
     target = llvm.Target.from_default_triple()
-    return target.create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=3)
-
-
-def _cached(key: str, make: Callable[[], str]) -> str:
-    path = cache_directory() / "kernels" / f"{key}.ll"
-    if path.exists():
-        return path.read_text()
-    text = make()
-    write_atomically(path, text.encode())
-    return text
+    return target.create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=jit)
 
 
 def kernel_key(participant: Participant) -> str:
@@ -295,7 +293,8 @@ def lower(participant: Participant) -> str:
     The text names no target and needs no symbol but libm's. Raises CompilationError,
     naming class and kernel, when Numba cannot compile a kernel or when the code needs Python.
     """
-    return _cached(kernel_key(participant), lambda: _lower_kernels(participant))
+    file = f"kernels/{kernel_key(participant)}.ll"
+    return cached(file, lambda: _lower_kernels(participant).encode()).read_text()
 
 
 def _lower_kernels(participant: Participant) -> str:
@@ -304,7 +303,7 @@ def _lower_kernels(participant: Participant) -> str:
     check_names(participant)
     storage = numba.from_dtype(participant.dtype)
     memo: dict[Any, Any] = {}
-    linked = None
+    modules = []
     for name, kernel in participant.kernels.items():
         times = kernel.__code__.co_argcount - 1
         signature = (storage, *([numba.float64] * times))
@@ -313,12 +312,10 @@ def _lower_kernels(participant: Participant) -> str:
             text = _lower(f"kernel_{name}", dispatcher, signature)
         except CompilationError as error:
             raise CompilationError(f"{type(participant).__name__}: {error}") from error
-        module = llvm.parse_assembly(text)
-        if linked is None:
-            linked = module
-        else:
-            linked.link_in(module)
-    return str(linked)
+        modules.append(llvm.parse_assembly(text))
+    for module in modules[1:]:
+        modules[0].link_in(module)
+    return str(modules[0])
 
 
 # ----------------------------------------------------------------------- loading
@@ -332,12 +329,7 @@ def load(ir: str) -> Callable[[str], int]:
     key = hashlib.sha256(ir.encode()).hexdigest()
     with _engines_lock:
         if key not in _engines:
-            _target_machine()
-            features = llvm.get_host_cpu_features().flatten()
-            machine = llvm.Target.from_default_triple().create_target_machine(
-                cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True
-            )
-            engine = llvm.create_mcjit_compiler(llvm.parse_assembly(ir), machine)
+            engine = llvm.create_mcjit_compiler(llvm.parse_assembly(ir), _target_machine(jit=True))
             engine.finalize_object()
             _engines[key] = engine
     address: Callable[[str], int] = _engines[key].get_function_address

@@ -214,18 +214,19 @@ class Participant:
         for name, v in self.variables.items():
             shape = tuple(int(n) for n in v.shape)
             self._views[name] = memory[v.slot : v.slot + v.size].reshape(shape)
-        for name, kind in VECTORS.items():
-            first, size = self.zones[kind]
-            setattr(self, name, memory[first : first + size] if size else memory[-1:])
+        for name, (first, size) in self._vectors().items():
+            setattr(self, name, memory[first : first + size])
+
+    def _vectors(self) -> dict[str, tuple[int, int]]:
+        """Return first slot and size of every vector; the spare slot for an empty zone."""
+        spare = (self.memory.size - 1, 1)
+        return {name: self.zones[kind] if self.zones[kind][1] else spare for name, kind in VECTORS.items()}
 
     @property
     def dtype(self) -> np.dtype[Any]:
         """The storage as a NumPy dtype; the vectors overlap the variables of their zone."""
         fields = {n: (v.slot, v.shape) for n, v in self.variables.items()}
-        spare = self.memory.size - 1
-        for name, kind in VECTORS.items():
-            first, size = self.zones[kind]
-            fields[name] = (first, (size,)) if size else (spare, (1,))
+        fields |= {n: (first, (size,)) for n, (first, size) in self._vectors().items()}
         return np.dtype(
             {
                 "names": list(fields),

@@ -69,8 +69,10 @@ class RunSignals:
         """Keep an exception that a component raised, for the simulation."""
         self.exception, self.place = exception, f"{name} failed {when} t = {t:g} s"
 
-    def error(self) -> SimulationError:
-        """Return the exception that a callback left as an error of the run."""
+    def error(self) -> BaseException:
+        """Return the exception that a callback left; Ctrl-C and EndOfRun unchanged, others as an error."""
+        if isinstance(self.exception, (EndOfRun, KeyboardInterrupt)):
+            return self.exception
         text = str(self.exception)
         if not isinstance(self.exception, SimulationError):  # which names place and time itself
             kind = type(self.exception).__name__

@@ -17,8 +17,7 @@ from ..errors import WiringError
 from ..loop.instance import Instance, MakesInstance, Setting, Stepping
 from ..loop.loop import Loop
 from ..loop.operations import Copy, Operation
-from ..loop.signals import EndOfRun, RunSignals, operation_error
-from ..result import SimulationError
+from ..loop.signals import RunSignals, operation_error
 from ..system.system import Connection, System
 from .kernel_instance import KernelInstance
 from .plan import RunPlan
@@ -50,17 +49,12 @@ class Binding:
         names: dict[str, set[str]] = defaultdict(set)
         for port in [*used, *ends, *(c.source for c in system.text_connections)]:
             names[port.participant].add(port.name)
+        is_stage = plan.coupling == "continuous"
         try:
             for name, component in components.items():
                 every = self.every.get(name)
-                setting = Setting(
-                    step=plan.step * (every or 1),
-                    every=every,
-                    is_stage=plan.coupling == "continuous",
-                    jit=plan.jit,
-                    used=names[name],
-                    signals=self.signals,
-                )
+                step = plan.step * (every or 1)
+                setting = Setting(step, every, is_stage, plan.jit, names[name], self.signals)
                 self.instances[name] = _instance(name, component, setting)
             for c in system.text_connections:
                 target = self.instances[c.target.participant]
@@ -140,20 +134,16 @@ class Binding:
         """Initialize the instances at t_0."""
         for instance in self.instances.values():
             instance.start(t0)
-            if isinstance(self.signals.exception, KeyboardInterrupt):
-                raise self.signals.exception
             if self.signals.exception is not None:
                 raise self.signals.error()
 
     def run_once(self, loop: Loop, k: int) -> None:
         """Run a loop at t_k; raise the exception that ends the run."""
         if loop.run(k, k + 1, k, self.plan.start, self.plan.step):
-            if isinstance(self.signals.exception, (EndOfRun, KeyboardInterrupt)):
-                raise self.signals.exception
             raise self.error(loop)
 
-    def error(self, loop: Loop) -> SimulationError:
-        """Return the error of a loop that has stopped."""
+    def error(self, loop: Loop) -> BaseException:
+        """Return the exception that stopped a loop."""
         if self.signals.exception is not None:
             return self.signals.error()
         row, k, status = loop.report.tolist()

@@ -273,8 +273,6 @@ class Simulation:
                 if loop.run(self._k, until, last, plan.start, plan.step, self._acted):
                     self._k = int(loop.report[1])
                     self._acted = False
-                    if isinstance(signals.exception, KeyboardInterrupt):
-                        raise signals.exception
                     if isinstance(signals.exception, EndOfRun):
                         return self._end(signals.exception.text)
                     raise self._binding.error(loop)

@@ -59,7 +59,7 @@ def streams_of(seed, n):
 
 
 def test_first_numbers_are_the_published_ones():
-    """The first five numbers of the package RngStreams, to the ten digits that are in print."""
+    """The first five numbers of the package RngStreams, to the ten printed digits."""
     state = np.full(6, 12345.0)
     printed = [0.1270111220, 0.3185275654, 0.3091860156, 0.8258468629, 0.2216299158]
     assert np.allclose([uniform(state) for _ in printed], printed, rtol=0, atol=5e-11)

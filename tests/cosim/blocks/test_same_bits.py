@@ -45,7 +45,7 @@ BLOCKS = {
 
 @pytest.mark.parametrize("name", BLOCKS)
 def test_interpreted_is_compiled(name):
-    """On many seeds, for a rounding that differs is rare."""
+    """On many seeds, because a rounding that differs is rare."""
     block = BLOCKS[name]()
     for seed in range(10):
         inputs = np.random.default_rng(seed).normal(size=(60, block.zones["input"][1]))
@@ -65,6 +65,6 @@ def test_state_space_interpreted_is_compiled(name, seed):
 
 
 def test_driving_moves_something():
-    """The comparison is not of memory that nobody writes."""
+    """The compared memory is written: it changes from step to step."""
     rows = drive(Delay(2, n=1), np.arange(5.0)[:, None], 0.01, jit=True)
     assert (rows[1:] != rows[:-1]).any(axis=1).all()

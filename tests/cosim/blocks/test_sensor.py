@@ -45,7 +45,7 @@ def test_sensor_dynamics_step_response():
 
 
 def test_sensor_channels_are_independent(rng):
-    """Closed form a channel: bit for bit the single sensor's."""
+    """Each channel gives the bits of a single sensor."""
     u = rng.normal(size=(50, 3))
     three = trace(SensorDynamics(n=3), u, 0.01, "y")
     for i in range(3):

@@ -28,7 +28,7 @@ def signal(source, step, stop, start=0.0, **options):
 @pytest.mark.parametrize("interpolation", ["linear", "hold"])
 @pytest.mark.parametrize("dt", [0.01, 0.001, 1 / 3, 0.005])
 def test_a_record_is_exact_on_its_grid(interpolation, dt):
-    """900 s at 1 ms and more: every value its own, bit for bit, so no shift and no drift."""
+    """900 s at 1 ms and more: the values of the record, bit for bit: no shift, no drift."""
     y = signal(RecordSource(VALUES, dt, interpolation=interpolation), dt, 90_000 * dt)
     assert np.array_equal(y, VALUES)
 
@@ -71,7 +71,7 @@ def test_a_record_brings_dt_unit_and_start():
 
 
 def test_units_are_converted_at_a_connection():
-    """A record in g reaches an input in m/s2 as 9.80665 times: standard gravity."""
+    """A record in g reaches an input in m/s^2 as 9.80665 times: standard gravity."""
     system = System({"g": RecordSource([1.0, 1.0], 1.0, unit="g_0"), "s": WeightedSum([1.0], unit="m/s2")})
     system.connect("g.y", "s.u[1]")
     assert np.ravel(simulate(system, step=1.0, stop=1.0, record=["s.y"])["s.y"]) == pytest.approx(9.80665)

@@ -180,7 +180,7 @@ def test_assigning_an_array_copies_it(jit):
 
 
 def test_the_code_needs_libm_at_most():
-    """One text for the loop and for an FMU: no Numba, no Python, no machine named."""
+    """One text for the loop and for an FMU: without Numba, Python or the name of a machine."""
     import llvmlite.binding as llvm
 
     class Curve(Continuous):
