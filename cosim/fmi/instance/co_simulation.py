@@ -26,12 +26,6 @@ class CoSimulationInstance(EventInstance):
         super().__init__(driver, used)
         self._timers = Timers(driver, self.fmu.clocks.values(), h)
 
-    def start(self, t0: float) -> None:
-        """Take the FMU through initialization and, in event mode, the events of the start."""
-        super().start(t0)
-        if self.driver.event_mode:
-            self._start_events(t0)
-
     def _settle(self, t0: float) -> None:
         self._timers.start(t0, self.intervals)
 

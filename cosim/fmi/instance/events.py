@@ -29,6 +29,15 @@ class EventInstance(FMUInstance):
         self.event_time = driver.event_time
         self._output_clocks = [c.reference for c in self.fmu.clocks.values() if c.is_output]
 
+    def start(self, t0: float) -> None:
+        """Take the FMU through initialization and, where there is an event mode, the events of the start."""
+        super().start(t0)
+        if not self.driver.event_mode:
+            return
+        if self._discrete_states(t0):
+            raise SimulationError(f"{self.name} asked to end the simulation at its start, t = {t0:g} s")
+        self._resume()
+
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
         return [*super().arrays(), self.event_time]
@@ -99,12 +108,6 @@ class EventInstance(FMUInstance):
     def end_run(self, t: float, at_end: bool) -> None:
         """Note that the FMU asks at t to end the run."""
         self.signals.ask_to_end(self.name, t, at_end)
-
-    def _start_events(self, t0: float) -> None:
-        """Handle the events of the start."""
-        if self._discrete_states(t0):
-            raise SimulationError(f"{self.name} asked to end the simulation at its start, t = {t0:g} s")
-        self._resume()
 
     def _resume(self) -> None:
         """Leave event mode."""

@@ -52,11 +52,6 @@ class ModelExchangeInstance(EventInstance):
         self.steps: EventSteps | None = None
         self.is_late = False
 
-    def start(self, t0: float) -> None:
-        """Take the FMU through initialization and the events of the start."""
-        super().start(t0)
-        self._start_events(t0)
-
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
         return [*super().arrays(), self.states, self.flags, self.signs]
@@ -150,7 +145,7 @@ class ModelExchangeInstance(EventInstance):
         if self.steps is None:
             from .cvode import Cvode
 
-            self.steps = self._event_steps(Cvode(self.model, t, self.tolerance))
+            self.steps = EventSteps(self.model, Cvode(self.model, t, self.tolerance), self)
         self.model.set_time(t)
         signs = self._indicator_signs()
         if (signs != self.signs).any():  # the new inputs at t have caused an event
@@ -161,16 +156,14 @@ class ModelExchangeInstance(EventInstance):
 
     def _carry_by_fixed_steps(self, t: float, h: float) -> None:
         if self.steps is None:
-            self.steps = self._event_steps(RungeKutta(self.model, self.solver, self.options.substeps))
+            integrator = RungeKutta(self.model, self.solver, self.options.substeps)
+            self.steps = EventSteps(self.model, integrator, self)
         self.model.set_time(t)
         self.steps.carry(t, h)
         self.model.get_states(self.state_address)
 
-    def _event_steps(self, integrator: Any) -> EventSteps:
-        return EventSteps(self.model, integrator, self._completed, self)
-
-    def _completed(self, t: float, at_end: bool) -> bool:
-        """Report a completed step to the model; return whether an event is to be handled."""
+    def completed(self, t: float, at_end: bool) -> bool:
+        """Report a completed step at t to the model; return whether an event must be handled."""
         event, end = self.driver.attempt("complete a step", self.api.completedIntegratorStep)
         if end:
             self.end_run(t, at_end)
