@@ -96,23 +96,11 @@ class ModelExchangeInstance(EventInstance):
         )
 
     def _vector(self, name: str, address: int) -> Operation:
-        return Vector(
-            function=self.driver.address(name),
-            component=self._component,
-            values=address,
-            count=self.n_states,
-            participant=self.name,
-        )
+        return self._call(Vector, name, values=address, count=self.n_states)
 
     def set_states(self, fraction: float, substeps: int = 1) -> list[Operation]:
         """Set time and states."""
-        time = SetTime(
-            function=self.driver.address("SetTime"),
-            component=self._component,
-            fraction=fraction,
-            substeps=substeps,
-            participant=self.name,
-        )
+        time = self._call(SetTime, "SetTime", fraction=fraction, substeps=substeps)
         if not self.n_states:
             return [time]
         return [time, self._vector("SetContinuousStates", self.state_address)]
@@ -125,15 +113,14 @@ class ModelExchangeInstance(EventInstance):
         """Report a completed step to the model; handle its events."""
         self.event_address = self.event_address or self.signals.callback(self.name, self._handle_events)
         # always, even if the model states that it need not be told: FMPy reads that flag inverted
-        completed = CompletedStep(
-            function=self.driver.address("CompletedIntegratorStep"),
-            component=self._component,
+        completed = self._call(
+            CompletedStep,
+            "CompletedIntegratorStep",
             flags=int(self.flags.ctypes.data),
             event_time=int(self.event_time.ctypes.data),
             events=self.event_address,
             boolean=f"i{8 * self.flags.itemsize}",
             fraction=1.0,
-            participant=self.name,
         )
         text = f"{self.name}: events (Python callback)"
         call = Call(text=text, function=self.event_address, fraction=1.0, participant=self.name)
