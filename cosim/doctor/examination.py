@@ -23,7 +23,7 @@ from .report import Finding, Report
 
 _INTERFACES = ("Co-Simulation", "Model Exchange")
 TIME_LIMIT = 60.0  # s of one probe; 1,000 instances of an ordinary FMU take two
-_START_LIMIT = 60.0  # s until Python and the package are loaded, on a busy machine as well
+_START_LIMIT = 60.0  # s until Python and the package are loaded, even on a busy machine
 _FILE = ("",)
 
 

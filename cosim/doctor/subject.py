@@ -60,7 +60,7 @@ class Subject:
         if self.model_exchange:
             self.model = ContinuousTime(self.driver, *self.driver.counts())
             self.model.t = self.t0
-            self.steps = EventSteps(self.model, RungeKutta(self.model, "ode1", 1), self._completed, self)
+            self.steps = EventSteps(self.model, RungeKutta(self.model, "ode1", 1), self)
         self.start_inputs = self.get(self.inputs)
         return self
 
@@ -131,7 +131,8 @@ class Subject:
             self.driver.do_step(t, h)
             self.driver.finish_step(t, h, self)
 
-    def _completed(self, t: float, at_end: bool) -> bool:
+    def completed(self, t: float, at_end: bool) -> bool:
+        """Report a completed step; return True, so that an event is handled after every step."""
         self.driver.attempt("complete a step", self.api.completedIntegratorStep)
         return True
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import replace
-from typing import Any
 
 from ...loop.fmi_operations import FMI2DoStep, FMI3DoStep
 from ...loop.operations import SLACK, Operation
@@ -26,12 +25,6 @@ class CoSimulationInstance(EventInstance):
         super().__init__(driver, used)
         self._timers = Timers(driver, self.fmu.clocks.values(), h)
 
-    def start(self, t0: float) -> None:
-        """Take the FMU through initialization and, in event mode, the events of the start."""
-        super().start(t0)
-        if self.driver.event_mode:
-            self._start_events(t0)
-
     def _settle(self, t0: float) -> None:
         self._timers.start(t0, self.intervals)
 
@@ -46,18 +39,13 @@ class CoSimulationInstance(EventInstance):
 
     def advance(self) -> list[Operation]:
         """Do the step."""
-        common: dict[str, Any] = {
-            "text": f"{self.name}: step (FMU)",
-            "participant": self.name,
-            "function": self.driver.address("DoStep"),
-            "component": self._component,
-        }
-        answer = self.driver.answer
+        text, answer = f"{self.name}: step (FMU)", self.driver.answer
         if answer is None:
-            return [FMI2DoStep(discarded=self.signals.callback(self.name, self._discarded), **common)]
+            discarded = self.signals.callback(self.name, self._discarded)
+            return [self._call(FMI2DoStep, "DoStep", text=text, discarded=discarded)]
         flags, times = int(answer.flags.ctypes.data), int(answer.times.ctypes.data)
         finish = self.signals.callback(self.name, lambda t, h: self.driver.finish_step(t, h, self))
-        return [FMI3DoStep(flags=flags, times=times, interrupted=finish, **common)]
+        return [self._call(FMI3DoStep, "DoStep", text=text, flags=flags, times=times, interrupted=finish)]
 
     def _discarded(self, t: float, h: float) -> None:
         """Find out why FMI 2.0 discarded a step: to end the run, or because it failed."""

@@ -10,7 +10,6 @@ Time events are met exactly. Nothing is recorded at an event.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -75,26 +74,22 @@ class RungeKutta:
         self.x += h * (np.asarray(weights) @ self.slopes)
 
 
+class Owner(Interrupts, Protocol):
+    """The owner of the steps, which handles their events."""
+
+    def completed(self, t: float, at_end: bool) -> bool:
+        """Report a completed step at t to the model; return whether an event must be handled.
+
+        `at_end` tells whether t is the end of the communication step.
+        """
+
+
 class EventSteps:
-    """The integration of a model over communication steps.
+    """The integration of a model over communication steps."""
 
-    completed
-        reports a completed step at t to the model, and whether t is the end of the communication
-        step; returns whether an event is to be handled
-    owner
-        handles the events
-    """
-
-    def __init__(
-        self,
-        model: ContinuousTime,
-        integrator: Integrator,
-        completed: Callable[[float, bool], bool],
-        owner: Interrupts,
-    ) -> None:
+    def __init__(self, model: ContinuousTime, integrator: Integrator, owner: Owner) -> None:
         self.model = model
         self.integrator = integrator
-        self.completed = completed
         self.owner = owner
         self.next_event = model.driver.event_time
 
@@ -112,7 +107,7 @@ class EventSteps:
                 t = until
                 self.model.set_time(t)
             at_end = t >= end - SLACK * h
-            asked = self.completed(t, at_end)
+            asked = self.owner.completed(t, at_end)
             if root or asked or (timed and t >= until):
                 self.owner.handle_event(t, at_end)
                 if t < end:

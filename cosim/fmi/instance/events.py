@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...loop.operations import Call, Copy, Operation
+from ...loop.operations import Copy, Operation
 from ...result import SimulationError
 from .driver import Driver
 from .instance import FMUInstance, VariableGroup
@@ -28,6 +28,15 @@ class EventInstance(FMUInstance):
         #: (1,) time of the next time event, in s
         self.event_time = driver.event_time
         self._output_clocks = [c.reference for c in self.fmu.clocks.values() if c.is_output]
+
+    def start(self, t0: float) -> None:
+        """Take the FMU through initialization and, where there is an event mode, the events of the start."""
+        super().start(t0)
+        if not self.driver.event_mode:
+            return
+        if self._discrete_states(t0):
+            raise SimulationError(f"{self.name} asked to end the simulation at its start, t = {t0:g} s")
+        self._resume()
 
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
@@ -45,12 +54,13 @@ class EventInstance(FMUInstance):
         native = [op for x in self.inputs if x not in waiting for op in self._set_inputs(x)]
         forget = [self._scaled(x.last, x.last, 0.0) for x in self.outputs if x.is_clock]
         if not self.driver.event_mode:
-            return [*native, *self._latch_texts()]
+            if not self.text_sources:
+                return native
+            return [*native, self._callback("text inputs", lambda t, h: self._set_texts(self._new_texts()))]
         if not waiting and not self.fmu.clocks and not self.text_sources:
             return native
-        send = self.signals.callback(self.name, lambda t, h: self._send(t, waiting))
         what = "discrete inputs and clocks" if self.fmu.clocks else "discrete inputs"
-        sent = Call(text=f"{self.name}: {what} (Python callback)", function=send, participant=self.name)
+        sent = self._callback(what, lambda t, h: self._send(t, waiting))
         return [*native, *forget, *(op for x in waiting for op in self._from_floats(x)), sent]
 
     def _get_outputs(self, x: VariableGroup, final: bool) -> list[Operation]:
@@ -99,12 +109,6 @@ class EventInstance(FMUInstance):
     def end_run(self, t: float, at_end: bool) -> None:
         """Note that the FMU asks at t to end the run."""
         self.signals.ask_to_end(self.name, t, at_end)
-
-    def _start_events(self, t0: float) -> None:
-        """Handle the events of the start."""
-        if self._discrete_states(t0):
-            raise SimulationError(f"{self.name} asked to end the simulation at its start, t = {t0:g} s")
-        self._resume()
 
     def _resume(self) -> None:
         """Leave event mode."""

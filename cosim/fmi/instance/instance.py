@@ -213,10 +213,15 @@ class FMUInstance:
 
     # ---------------------------------------------------------------------- operations
 
-    @property
-    def _component(self) -> int:
+    def _call(self, kind: Callable[..., Operation], name: str, **fields: Any) -> Operation:
+        """Return an operation that calls a function of FMI, given its name without prefix."""
         component = self.api.component
-        return int(component if isinstance(component, int) else component.value)
+        return kind(
+            function=self.driver.address(name),
+            component=int(component if isinstance(component, int) else component.value),
+            participant=self.name,
+            **fields,
+        )
 
     def address(self, port: str) -> int:
         """Return the address of the floats of a port."""
@@ -232,15 +237,14 @@ class FMUInstance:
         return [got] if is_float64 else [got, self._convert(ToFloat, x, x.raw, x.values)]
 
     def _values(self, what: str, x: VariableGroup, finite: bool = False) -> Operation:
-        return self.fmu.version.values(
-            function=self.driver.address(f"{what}{x.access}"),
-            component=self._component,
+        return self._call(
+            self.fmu.version.values,
+            f"{what}{x.access}",
             references=int(x.references.ctypes.data),
             values=int(x.raw.ctypes.data),
             n_references=len(x.references),
             count=len(x.elements),
             finite=finite,
-            participant=self.name,
         )
 
     def _convert(
@@ -260,20 +264,16 @@ class FMUInstance:
     def _from_floats(self, x: VariableGroup) -> list[Operation]:
         return [] if x.raw is x.values else [self._convert(FromFloat, x, x.values, x.raw)]
 
-    # --------------------------------------------------------- strings and binary data
-
-    def _text_op(self, what: str, function: Callable[[float, float], None]) -> Operation:
+    def _callback(self, what: str, function: Callable[[float, float], None]) -> Operation:
+        """Return an operation that calls function(t, h) in Python."""
         callback = self.signals.callback(self.name, function)
         return Call(text=f"{self.name}: {what} (Python callback)", function=callback, participant=self.name)
 
+    # --------------------------------------------------------- strings and binary data
+
     def read_texts(self) -> list[Operation]:
         """Get the strings and binary data that are used."""
-        return [self._text_op("text outputs", self._get_texts)] if self.texts else []
-
-    def _latch_texts(self) -> list[Operation]:
-        if not self.text_sources:
-            return []
-        return [self._text_op("text inputs", lambda t, h: self._set_texts(self._new_texts()))]
+        return [self._callback("text outputs", self._get_texts)] if self.texts else []
 
     def _get_texts(self, t: float, h: float) -> None:
         for name in self.texts:

@@ -52,11 +52,6 @@ class ModelExchangeInstance(EventInstance):
         self.steps: EventSteps | None = None
         self.is_late = False
 
-    def start(self, t0: float) -> None:
-        """Take the FMU through initialization and the events of the start."""
-        super().start(t0)
-        self._start_events(t0)
-
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
         return [*super().arrays(), self.states, self.flags, self.signs]
@@ -101,23 +96,11 @@ class ModelExchangeInstance(EventInstance):
         )
 
     def _vector(self, name: str, address: int) -> Operation:
-        return Vector(
-            function=self.driver.address(name),
-            component=self._component,
-            values=address,
-            count=self.n_states,
-            participant=self.name,
-        )
+        return self._call(Vector, name, values=address, count=self.n_states)
 
     def set_states(self, fraction: float, substeps: int = 1) -> list[Operation]:
         """Set time and states."""
-        time = SetTime(
-            function=self.driver.address("SetTime"),
-            component=self._component,
-            fraction=fraction,
-            substeps=substeps,
-            participant=self.name,
-        )
+        time = self._call(SetTime, "SetTime", fraction=fraction, substeps=substeps)
         if not self.n_states:
             return [time]
         return [time, self._vector("SetContinuousStates", self.state_address)]
@@ -130,15 +113,14 @@ class ModelExchangeInstance(EventInstance):
         """Report a completed step to the model; handle its events."""
         self.event_address = self.event_address or self.signals.callback(self.name, self._handle_events)
         # always, even if the model states that it need not be told: FMPy reads that flag inverted
-        completed = CompletedStep(
-            function=self.driver.address("CompletedIntegratorStep"),
-            component=self._component,
+        completed = self._call(
+            CompletedStep,
+            "CompletedIntegratorStep",
             flags=int(self.flags.ctypes.data),
             event_time=int(self.event_time.ctypes.data),
             events=self.event_address,
             boolean=f"i{8 * self.flags.itemsize}",
             fraction=1.0,
-            participant=self.name,
         )
         text = f"{self.name}: events (Python callback)"
         call = Call(text=text, function=self.event_address, fraction=1.0, participant=self.name)
@@ -150,7 +132,7 @@ class ModelExchangeInstance(EventInstance):
         if self.steps is None:
             from .cvode import Cvode
 
-            self.steps = self._event_steps(Cvode(self.model, t, self.tolerance))
+            self.steps = EventSteps(self.model, Cvode(self.model, t, self.tolerance), self)
         self.model.set_time(t)
         signs = self._indicator_signs()
         if (signs != self.signs).any():  # the new inputs at t have caused an event
@@ -161,16 +143,14 @@ class ModelExchangeInstance(EventInstance):
 
     def _carry_by_fixed_steps(self, t: float, h: float) -> None:
         if self.steps is None:
-            self.steps = self._event_steps(RungeKutta(self.model, self.solver, self.options.substeps))
+            integrator = RungeKutta(self.model, self.solver, self.options.substeps)
+            self.steps = EventSteps(self.model, integrator, self)
         self.model.set_time(t)
         self.steps.carry(t, h)
         self.model.get_states(self.state_address)
 
-    def _event_steps(self, integrator: Any) -> EventSteps:
-        return EventSteps(self.model, integrator, self._completed, self)
-
-    def _completed(self, t: float, at_end: bool) -> bool:
-        """Report a completed step to the model; return whether an event is to be handled."""
+    def completed(self, t: float, at_end: bool) -> bool:
+        """Report a completed step at t to the model; return whether an event must be handled."""
         event, end = self.driver.attempt("complete a step", self.api.completedIntegratorStep)
         if end:
             self.end_run(t, at_end)

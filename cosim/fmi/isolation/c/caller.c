@@ -176,8 +176,8 @@ static size_t room(const struct argument *a)
     return bytes;
 }
 
-/* Write an argument to data from `used` on. A block that comes out goes in as well, since a function
-   that fails may leave it as it was. */
+/* Write an argument to data from `used` on. An output block is copied in as well, because a function
+   that fails may leave it unchanged. */
 static struct slot packed(unsigned char *data, size_t used, const struct argument *a)
 {
     if (a->kind == WORD)
@@ -219,8 +219,8 @@ static void unpack(const struct remote *r, const struct argument *a, const struc
 
 /* ------------------------------------------------------------------------ calls */
 
-/* Add a call to the next request; return its index, or minus the status of a failure: the call does not
-   fit, or those that had to be sent before it failed. */
+/* Add a call to the next request; return its index, or minus the status of a failure, because the call
+   does not fit or because calls that had to be sent before it failed. */
 static int add(struct remote *r, enum function function, const struct argument *arguments, int n)
 {
     size_t bytes = 0;

@@ -13,7 +13,7 @@
    none of them. There is one exception: loop_...Get... remembers the addresses of its arrays, and
    every later loop_...DoStep reads the value references and the former values again. An importer that
    calls loop_...Get... keeps these arrays in place, with the same length, until it frees the instance.
-   Strings and binary data that come out stay valid until the next call, as FMI says.
+   Output strings and binary data stay valid until the next call, as FMI requires.
 
    A call with a NULL instance returns an error status, or does nothing where it frees the instance; a
    NULL array reaches the FMU as NULL. The FMU may damage the host's process, so its answers are checked

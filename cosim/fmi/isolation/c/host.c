@@ -1,4 +1,4 @@
-/* The host of an isolated FMU, which makes the calls that come through shared memory. */
+/* The host's side of an isolated FMU: it makes the calls that come through shared memory. */
 
 #include "host.h"
 
