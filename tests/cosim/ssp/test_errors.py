@@ -138,7 +138,7 @@ UNSUITABLE = [
     ),
     (
         nested(connection("in", "k.x", NOTE.format(DELAY)), connection("g.u", "sub.in")),
-        r"g\.u -> sub\.in -> sub\.k\.x is delayed on a part of its way, .*; delay a direct connection",
+        r"g\.u -> sub\.in -> sub\.k\.x is delayed on part of its path, .*; delay a direct connection",
     ),
     (system(component("g", "Gain", GAIN, NOTE.format(EVERY))), r"component g: '2\.5' must be a whole number"),
     (
