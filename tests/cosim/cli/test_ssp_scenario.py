@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim import Result
-from cosim.cli.app import main
+from tests.cosim.cli.command import call
 
 SCENARIO = '''
 """A mass that is braked at every second point."""
@@ -65,15 +65,6 @@ def folder(tmp_path, monkeypatch, capsys):
     assert call("export", "braking.py", "--out", "loop.ssp") == 0
     assert capsys.readouterr().out.startswith("loop.ssp (")
     return tmp_path
-
-
-def call(*arguments):
-    """Run the command line in this process; return its exit code."""
-    try:
-        main([str(a) for a in arguments])
-    except SystemExit as end:
-        return end.code or 0
-    return 0
 
 
 def velocity(folder):
