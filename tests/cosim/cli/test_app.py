@@ -1,4 +1,4 @@
-"""The command line: what it prints and writes, and the errors that end with exit code 2."""
+"""The command line: its output, its files, and the errors that end with exit code 2."""
 
 import json
 import os

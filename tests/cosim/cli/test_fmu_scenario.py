@@ -54,7 +54,7 @@ def folder(tmp_path_factory):
 
 
 def test_a_table_between_its_rows_at_its_rows_and_outside():
-    """0.1 k is below 0.3 and 0.7 in floats at some k; a row there counts all the same."""
+    """As floats, 0.1 k is below 0.3 and 0.7 at some k; a row at these instants counts all the same."""
     t = [0.25, 0.3, 0.7, 0.7, 1.05]
     rows = np.array([[1.0, 5.0], [2.0, 4.0], [3.0, 3.0], [-1.0, 2.0], [0.4, 1.0]])
     parts = {"linear": TableSource(t, rows, unit="N"), "held": TableSource(t, rows, interpolation="hold")}
@@ -106,7 +106,7 @@ def test_discrete_inputs_are_held(folder, tmp_path):
     study = study_of_file(FMUStudy, folder / "probe.fmu")
     record = ("b_out", "e_out", "i_out", "r_out")
     result = study(input=tmp_path / "in.csv", stop=1.0, step=0.25, record=record).run()
-    # row of the file that is latched at t_k-1, with which y_k is computed; at t_0 what it starts with
+    # row of the file that is latched at t_k-1 and gives y_k; the first row gives y_0
     late = [0, 0, 0, 1, 1]
     for name, values in (("b_out", (0, 1)), ("e_out", (1, 2)), ("i_out", (-4, 8))):
         assert list(result[f"probe.{name}"]) == [values[row] for row in late], name

@@ -89,7 +89,7 @@ def test_a_file_runs_as_its_scenario_does(folder):
 
 @pytest.mark.parametrize("part", ["braking.py:Harder", "braking:Harder"])
 def test_a_controller_from_the_command_line(folder, part, monkeypatch):
-    """A class acts with the period of what it replaces."""
+    """A class acts with the period of the component that it replaces."""
     monkeypatch.syspath_prepend(str(folder))
     assert call("run", "loop.ssp", "--replace", f"brake={part}") == 0
     assert np.array_equal(velocity(folder), reference(folder, "--harder"))
