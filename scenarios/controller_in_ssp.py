@@ -1,7 +1,7 @@
 """Your controller in other tools: plant, load and controller as FMUs, wired in one SSP file.
 
     cosim run controller_in_ssp --ssp loop.ssp        write the file, read it back, run it
-    cosim table controller_in_ssp                     this project's loop beside that of ecos
+    cosim table controller_in_ssp                     compare the loop with that of ecos
     cosim run loop.ssp --replace control=mine.py:Mine
 
 A tool such as ecos exchanges all values and then steps all FMUs, so that each block on the way adds
@@ -38,7 +38,7 @@ class RoofDamper(Block):
 
 
 def build(*, late: bool = False) -> System:
-    """Return the system; late: with the delays of a master that does not order its blocks."""
+    """Return the system; `late` adds the delays of a master that does not order its blocks."""
     building = ShearBuilding.build([3.0, 2.0, 1.5], [3000.0, 2000.0, 1000.0], 0.02)
     ground = function_source(lambda t: 2.0 * math.sin(9.0 * t) * math.exp(-0.5 * t), unit="m/s^2")
     system = System({"building": building, "ground": ground, "control": RoofDamper()})
@@ -50,7 +50,7 @@ def build(*, late: bool = False) -> System:
 
 
 def run(*, ssp: Path = Path("out/controller_in_ssp/loop.ssp"), late: bool = False) -> Result:
-    """Write the SSP and run it; late: with the delays of other tools, ssp: the file."""
+    """Write the file `ssp` and run it; `late` adds the delays of other tools."""
     return simulate(read_ssp(export_ssp(build(late=late), ssp, step=STEP, stop=STOP)), step=STEP, stop=STOP)
 
 
@@ -67,9 +67,8 @@ def ecos(ssp: Path) -> list[float]:
 
 def table(*, ssp: Path = Path("out/controller_in_ssp/loop.ssp")) -> list[dict[str, Any]]:
     """Run the file here, with and without the delays of other tools, and in ecos if it is installed."""
-    runs = {
-        name: run(ssp=ssp, late=late)["building.x"][:, 2] for name, late in (("late", True), ("ours", False))
-    }
+    loops = {"here, late": True, "here": False}
+    runs = {name: run(ssp=ssp, late=late)["building.x"][:, 2] for name, late in loops.items()}
     try:
         runs["ecos"] = np.array(ecos(ssp))
     except CosimError as error:

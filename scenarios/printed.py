@@ -1,4 +1,4 @@
-"""The numbers that the thesis prints: printed.csv in the folder of each study."""
+"""Reading of printed.csv, the numbers that the thesis prints, in the folder of each study."""
 
 from __future__ import annotations
 

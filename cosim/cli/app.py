@@ -1,9 +1,9 @@
 """The command line: cosim list, run, table, export, inspect, doctor.
 
-The outermost layer: only the command line imports scenarios, controllers and fmus, and it
-does so when a command needs them. The options of a scenario are the fields of its study
-or the keyword arguments of its functions. A user's error ends with exit code 2 and one
-screen of text, an interrupted run with 130.
+This is the outermost layer: only the command line imports scenarios, controllers and fmus,
+and it does so when a command needs them. The options of a scenario are the fields of its
+study or the keyword arguments of its functions. A user's error ends with exit code 2 and
+one screen of text, an interrupted run with exit code 130.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _dispatch(tokens: list[str]) -> None:
 
 
 def _command(options: Options, body: Callable[..., None], **own: Any) -> Callable[..., None]:
-    """Return `body` as a command with the options of a study or table, and options of its own."""
+    """Return `body` as a command with the options of a study or table, and those in `own`."""
     keyword = inspect.Parameter.KEYWORD_ONLY
     added = [inspect.Parameter(n, keyword, default=d, annotation=a) for n, (a, d) in own.items()]
 
@@ -189,50 +189,49 @@ def export(
 
     platforms = list(platform) or None
     if ":" in what:
-        member = find_participant(what)
         path = out or Path(f"{what.rpartition(':')[2]}.fmu")
-        export_fmu(member, path, platforms=platforms, fmi_version=fmi_version or "2.0")
+        export_fmu(find_participant(what), path, platforms=platforms, fmi_version=fmi_version or "2.0")
     else:
         scenario = load_scenario(what)
         path = out or Path(f"{scenario.name}.ssp")
-        experiment = {"step": step or scenario.seconds("STEP"), "stop": stop or scenario.seconds("STOP")}
-        _export_system(
-            scenario.default_study().build(), path, platforms, fmi_version, ssp_version, **experiment
-        )
+        system = scenario.default_study().build()
+        step, stop = step or scenario.seconds("STEP"), stop or scenario.seconds("STOP")
+        if path.suffix == ".ssp":
+            from fmus.packaging.ssp import export_ssp
+
+            export_ssp(
+                system,
+                path,
+                step=step,
+                stop=stop,
+                version=ssp_version,
+                fmi_version=fmi_version,
+                platforms=platforms,
+            )
+        elif path.suffix == ".fmu":
+            _export_container(system, path, platforms, fmi_version or "2.0", step, stop)
+        else:
+            raise ScenarioError(
+                f"a system is exported as an .ssp or as one .fmu, not as {path}; change --out"
+            )
     print(f"{path} ({path.stat().st_size / 1024:.0f} KB)")
 
 
-def _export_system(
+def _export_container(
     system: System,
     path: Path,
     platforms: list[str] | None,
-    fmi_version: str | None,
-    ssp_version: str | None,
+    fmi_version: str,
     step: float | None,
     stop: float | None,
 ) -> None:
-    if path.suffix == ".ssp":
-        from fmus.packaging.ssp import export_ssp
+    from fmus.packaging.container import export_container
 
-        export_ssp(
-            system,
-            path,
-            step=step,
-            stop=stop,
-            version=ssp_version,
-            fmi_version=fmi_version,
-            platforms=platforms,
-        )
-    elif path.suffix == ".fmu":
-        from fmus.packaging.container import export_container
-
-        if step is None:
-            raise ScenarioError("a container needs its communication step; give it in seconds, --step 0.01")
-        if platforms:
-            raise ScenarioError("a container is made for this machine only; leave out --platform")
-        export_container(system, path, step=step, stop=stop, fmi_version=fmi_version or "2.0")
-    else:
-        raise ScenarioError(f"a system is exported as an .ssp or as one .fmu, not as {path}; change --out")
+    if step is None:
+        raise ScenarioError("a container needs its communication step; give it in seconds, --step 0.01")
+    if platforms:
+        raise ScenarioError("a container is made for this machine only; leave out --platform")
+    export_container(system, path, step=step, stop=stop, fmi_version=fmi_version)
 
 
 @_app.command(name="inspect")
@@ -249,8 +248,8 @@ def doctor(
 ) -> None:
     """Examine how an FMU behaves: validity, reset, state, leaks, feedthrough, step size, misuse.
 
-    The exit code reflects the worst finding: 0 ok or notes, 1 warnings, 2 errors (or wrong options,
-    then without a report), 3 a crash or a hang.
+    The exit code reflects the worst finding: 0 ok or notes, 1 warnings, 2 errors (or invalid options,
+    without a report), 3 a crash or a hang.
 
     Parameters
     ----------

@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,7 +19,6 @@ from ..result import Result
 from ..run.simulation import simulate
 from ..system.system import System
 from .input_table import connect_inputs, start_from_inputs
-from .scenario import Scenario
 
 _TRUTH = {"true": 1, "false": 0}
 
@@ -59,7 +57,7 @@ class FMUStudy:
 
     @property
     def name(self) -> str:
-        """The FMU's name in the system: that of its file where it is a Python name."""
+        """The FMU's name in the system: the stem of its file if that is a Python name, else fmu."""
         stem = self.path.stem
         return stem if re.fullmatch(r"[A-Za-z_]\w*", stem) else "fmu"
 
@@ -99,22 +97,10 @@ class FMUStudy:
         found: dict[str, tuple[float, str]] = {}
         for kind in ("peak", "rms"):
             for name, statistics in result.statistics.items():
-                values = np.atleast_1d(getattr(statistics, kind))
-                scalar = np.ndim(getattr(statistics, kind)) == 0
-                for i, value in enumerate(values):
-                    element = name if scalar else f"{name}[{i + 1}]"
+                for index, value in np.ndenumerate(getattr(statistics, kind)):
+                    element = f"{name}[{index[0] + 1}]" if index else name
                     found[f"{kind} {element}"] = (float(value), result.units.get(name) or "")
         return found
-
-
-def fmu_study(path: Path) -> type[FMUStudy]:
-    """Return the study of an FMU file."""
-    return type("Study", (FMUStudy,), {"path": path, "__module__": __name__, "__doc__": FMUStudy.__doc__})
-
-
-def fmu_scenario(path: Path) -> Scenario:
-    """Return the scenario of an FMU file."""
-    return Scenario(path.stem, SimpleNamespace(Study=fmu_study(path)))
 
 
 def _times(
@@ -122,17 +108,12 @@ def _times(
 ) -> tuple[float, float, float]:
     """Return start, stop and step: the given values, or else those of the FMU's default experiment."""
     experiment = fmu.description.defaultExperiment
-    given = (
-        {}
-        if experiment is None
-        else {n: getattr(experiment, n) for n in ("startTime", "stopTime", "stepSize")}
-    )
-    if given.get("stepSize") is None and not fmu.model_exchange:
-        given["stepSize"] = getattr(fmu.description.coSimulation, "fixedInternalStepSize", None)
-    begin = _time(fmu, start, given.get("startTime"), "startTime")
-    end = _time(fmu, stop, given.get("stopTime"), "stopTime")
-    h = _time(fmu, step, given.get("stepSize"), "stepSize")
-    begin = 0.0 if begin is None else begin
+    default_step = getattr(experiment, "stepSize", None)
+    if default_step is None and not fmu.model_exchange:
+        default_step = getattr(fmu.description.coSimulation, "fixedInternalStepSize", None)
+    begin = _time(fmu, start, getattr(experiment, "startTime", None), "startTime") or 0.0
+    end = _time(fmu, stop, getattr(experiment, "stopTime", None), "stopTime")
+    h = _time(fmu, step, default_step, "stepSize")
     if end is None:
         raise TimeError(f"{fmu.path.name} has no default stop time; give --stop, in s")
     if h is None:
@@ -141,9 +122,9 @@ def _times(
     return begin, end, h
 
 
-def _time(fmu: FMU, asked: float | None, default: Any, name: str) -> float | None:
-    if asked is not None or default is None:
-        return asked
+def _time(fmu: FMU, given: float | None, default: Any, name: str) -> float | None:
+    if given is not None or default is None:
+        return given
     try:
         value = float(default)
     except ValueError:

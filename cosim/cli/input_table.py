@@ -35,7 +35,7 @@ def connect_inputs(system: System, name: str, path: Path) -> None:
     header, lines = _read(path)
     for column, input_name in list(enumerate(header))[1:]:
         if column != header.index(input_name):
-            raise RecordError(f"{path}: there are two columns {input_name}; remove one")
+            raise RecordError(f"{path}: column {input_name} occurs twice; remove one")
         _check_input(path, fmu, input_name)
     instants = np.array([_number(path, i, "time", cells[0]) for i, cells in lines])
     for (i, _), before, t in zip(lines[1:], instants, instants[1:], strict=False):
@@ -46,7 +46,9 @@ def connect_inputs(system: System, name: str, path: Path) -> None:
         port = system.port(f"{name}.{input_name}", "input")
         wrong = [i for (i, _), row in zip(lines, rows, strict=True) if len(row) != port.count]
         if wrong:
-            raise RecordError(f"{path}:{wrong[0]}: {input_name} takes {port.count} numbers")
+            raise RecordError(
+                f"{path}:{wrong[0]}: {input_name} takes {port.count} numbers, separated by blanks"
+            )
         continuous = all(v.variability == "continuous" for v in fmu.input_ports[port.name].variables)
         source = TableSource(instants, rows, interpolation="linear" if continuous else "hold", unit=port.unit)
         system.add(f"input_{column}", source)
@@ -89,7 +91,7 @@ def _read(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
         raise RecordError(f"{path}: the first column is '{header[0]}'; it must be time, in s")
     for i, cells in lines[1:]:
         if len(cells) != len(header):
-            raise RecordError(f"{path}:{i}: {len(cells)} cells, and the header has {len(header)}")
+            raise RecordError(f"{path}:{i}: the row has {len(cells)} cells, the header has {len(header)}")
     return header, lines[1:]
 
 

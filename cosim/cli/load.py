@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 from ..core.participant import Participant
-from .fmu_scenario import fmu_scenario
+from .fmu_scenario import FMUStudy
 from .python_scenario import python_scenario
-from .scenario import Scenario, ScenarioError
-from .ssp_scenario import ssp_scenario
+from .scenario import Scenario, ScenarioError, study_of_file
+from .ssp_scenario import SSPStudy
+
+_STUDIES = {".fmu": FMUStudy, ".ssp": SSPStudy}
 
 
 def load_scenario(name: str) -> Scenario:
     """Load a scenario by its name, or a user's Python file, FMU or SSP by its path."""
-    if name.endswith(".fmu"):
-        return fmu_scenario(Path(name))
-    if name.endswith(".ssp"):
-        return ssp_scenario(Path(name))
-    return python_scenario(name)
+    path = Path(name)
+    if path.suffix not in _STUDIES:
+        return python_scenario(name)
+    return Scenario(path.stem, SimpleNamespace(Study=study_of_file(_STUDIES[path.suffix], path)))
 
 
 def find_participant(text: str) -> Participant:

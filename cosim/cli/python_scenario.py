@@ -1,4 +1,4 @@
-"""Python scenarios, and blocks in Python files: found by name or by path, and loaded."""
+"""The search for Python scenarios and blocks, by name or by path, and their loading."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def scenario_names() -> list[str]:
 
 
 def _defines_a_study(name: str) -> bool:
-    """Tell from the source, without importing it, whether a module defines Study or run."""
+    """Return whether a module defines Study or run, from its source, without importing it."""
     tree = ast.parse(_source(name))
     return any(getattr(node, "name", None) in ("Study", "run") for node in tree.body)
 
@@ -67,8 +67,8 @@ def python_scenario(name: str) -> Scenario:
 def load_file(path: Path) -> ModuleType:
     """Load a user's Python file; it may import modules of its own folder.
 
-    The module is registered under a name of its own, and its folder is searched last, so
-    that a file named random.py or numpy.py takes no other module's place.
+    The module gets a name that no other module has, and its folder is searched last, so that
+    a file named random.py or numpy.py does not replace another module.
     """
     if not path.is_file():
         raise ScenarioError(f"there is no file {path}; give the path or the name of a scenario")

@@ -33,6 +33,7 @@ import inspect
 import typing
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Annotated, Any
 
@@ -44,7 +45,7 @@ from ..result import Result
 
 
 class ScenarioError(CosimError):
-    """A scenario that does not exist, or that lacks a part which a command needs."""
+    """An error of a scenario: it does not exist, or it lacks a part that a command needs."""
 
 
 class Options:
@@ -85,6 +86,11 @@ class Options:
             made = options["options"]
             return made, {f.name: getattr(made, f.name) for f in dataclasses.fields(made)}
         return self._make(options), options
+
+
+def study_of_file(kind: type[Any], path: Path) -> type[Any]:
+    """Return the study of a file: a subclass of a study whose class variable `path` is its file."""
+    return type("Study", (kind,), {"path": path, "__module__": kind.__module__, "__doc__": kind.__doc__})
 
 
 class Scenario:
@@ -148,16 +154,16 @@ class Scenario:
         return study
 
     def participant(self, name: str) -> Participant:
-        """Return a Python participant of the default system."""
+        """Return the Python object behind a component of the default system."""
         system = self.default_study().build()
         if name not in system.participants:
             raise WiringError(
                 f"scenario {self.name} has no participant '{name}'" + did_you_mean(name, system.participants)
             )
-        member = system.participants[name]
-        source = member if isinstance(member, Participant) else member.source
+        component = system.participants[name]
+        source = component if isinstance(component, Participant) else component.source
         if source is None:
-            raise ScenarioError(f"{self.name}:{name} is already an FMU ({member.path}); copy that file")
+            raise ScenarioError(f"{self.name}:{name} is already an FMU ({component.path}); copy that file")
         found: Participant = source
         return found
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, ClassVar, get_args
 
 from ..errors import did_you_mean
@@ -15,7 +14,7 @@ from ..run.simulation import simulate
 from ..ssp.reader import Package, read_package
 from ..system.system import System
 from .python_scenario import find_part
-from .scenario import Scenario, ScenarioError
+from .scenario import ScenarioError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,9 +30,9 @@ class SSPStudy:
     start_time: float | None = None
     """time at which the run starts, s [that of the file, or 0]"""
     coupling: Coupling | None = None
-    """sampled: inputs held over a step; continuous: stage coupling, all states are integrated together;
-    iterated: plants that drive each other agree at every communication point [that of the file, or
-    sampled]"""
+    """sampled: inputs are held over a step; continuous: stage coupling, which integrates all states
+    together; iterated: plants that drive each other agree at every communication point [that of the
+    file, or sampled]"""
     solver: Solver | None = None
     """solver of stage coupling [that of the file, or ode3]"""
     record: tuple[str, ...] = ()
@@ -76,12 +75,6 @@ class SSPStudy:
                 f"{self.path}: '{value}' is not known" + did_you_mean(value, get_args(choices))
             )
         return value
-
-
-def ssp_scenario(path: Path) -> Scenario:
-    """Return the scenario of an SSP file."""
-    own = {"path": path, "__module__": __name__, "__doc__": SSPStudy.__doc__}
-    return Scenario(path.stem, SimpleNamespace(Study=type("Study", (SSPStudy,), own)))
 
 
 def _replacement(text: str) -> tuple[str, Any]:

@@ -1,4 +1,4 @@
-"""Reads systems from SSP files, version 1.0 and 2.0; fmus/packaging/ssp.py writes them."""
+"""Systems from SSP files, versions 1.0 and 2.0; `fmus.packaging.ssp` writes them."""
 
 from .reader import read_package, read_ssp
 

@@ -50,7 +50,7 @@ TYPES_1 = {
     "Enumeration": "Enumeration",
     "Binary": "Binary",
 }
-#: the name of a unit, and its definition where there is one
+#: the name of a unit, and its definition if a file or an FMU gives one
 Unit: TypeAlias = tuple[str | None, Definition | None]
 
 

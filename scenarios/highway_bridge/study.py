@@ -119,9 +119,9 @@ def simulate_bridge(
         if found is None or "bridge.failure" not in found or found["bridge.failure"][-1, 0] < 0.0:
             raise
         element, time, residual = found["bridge.failure"][-1]
-        told = SimulationError(
+        named = SimulationError(
             f"bridge: element {int(element)} did not converge in the step after t = {time:.4f} s, residual "
             f"{residual:.2g} of its scale; take a smaller step, or more bisections"
         )
-        told.result = found
-        raise told from error
+        named.result = found
+        raise named from error

@@ -1,6 +1,6 @@
 """The control loop of chapter 2, and the choices that the thesis does not print.
 
-All controllers share one model and one observer; the control laws stand in for each other.
+All controllers share one model and one observer; the control laws are interchangeable.
 
     model      12 states by dominant modes: displacements and velocities of floors 16, 30, 46,
                60, 76 and of the damper (2.3); accelerations of floors 50, 76 and of the

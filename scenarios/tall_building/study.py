@@ -5,7 +5,7 @@
     measured  accelerations of floors 50, 76 and of the damper, with noise
     control   12-state observer, then LQG, sliding mode control, the same with the low-pass
               filter (2.17), or the continuous sliding mode control that stands in for MSMC
-    judged    by the 16 criteria of appendix A (criteria.py)
+    criteria  the 16 of appendix A (criteria.py)
 
 README.md compares printed and computed numbers and says which parameters were fitted to the print.
 """
@@ -105,7 +105,7 @@ class Study:
         return system
 
     def _close_the_loop(self, system: System) -> None:
-        """Measured accelerations -> observer -> control law -> force of the actuator."""
+        """Connect measured accelerations, observer, control law and force of the actuator."""
         model = model_of(self.data)
         system.add("observer", tower_observer(model))
         measure(system, self._measured(), self._measurement_chain(), "observer.y")
@@ -126,7 +126,7 @@ class Study:
         system.connect(force, "power.u")
 
     def _measured(self) -> list[str]:
-        """Accelerations of floors 50, 76 and of the damper."""
+        """Return the ports of the accelerations of floors 50, 76 and of the damper."""
         missing = [f for f in (50, 76) if f not in self.floors]
         if missing:
             raise CosimError(
@@ -136,12 +136,12 @@ class Study:
 
     def _measurement_chain(self) -> dict[str, Participant]:
         chain: dict[str, Participant] = {}
-        unit = "m/s^2"
+        unit, deviation = "m/s^2", [self.noise] * 3
         if self.sensor_dynamics:
             chain["sensors"] = SensorDynamics(n=3, unit=unit)
         if self.noise:
             chain["noise"] = MeasurementNoise(
-                [self.noise] * 3, sample_period=PERIOD, seed=self.noise_seed, unit=unit
+                deviation, sample_period=PERIOD, seed=self.noise_seed, unit=unit
             )
         if self.bits:
             chain["converter"] = AnalogToDigital([2.0] * 3, bits=self.bits, unit=unit)
@@ -198,8 +198,8 @@ class Study:
         return figures(result)
 
 
-def _append(system: System, source: str, name: str, member: Participant, into: str, out: str) -> str:
+def _append(system: System, source: str, name: str, part: Participant, into: str, out: str) -> str:
     """Add a participant with one input behind a port; return its output port."""
-    system.add(name, member)
+    system.add(name, part)
     system.connect(source, f"{name}.{into}")
     return f"{name}.{out}"

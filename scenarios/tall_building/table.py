@@ -39,13 +39,9 @@ class Table:
         if self.study == "coupling":
             return coupling_errors(self.data, self.wind, self.seed, self.duration)
         base = Study(
-            data=self.data,
-            wind=self.wind,
-            seed=self.seed,
-            duration=self.duration,
-            plant=self.plant,
-            record=False,
-        )
+            data=self.data, wind=self.wind, seed=self.seed, duration=self.duration,
+            plant=self.plant, record=False,
+        )  # fmt: skip
         if self.study == "thesis":
             return thesis_rows(base, self.workers)
         return variant_rows(self.study, base, self.workers)
@@ -57,7 +53,7 @@ class Table:
         return coupling_text(rows) if self.study == "coupling" else variant_text(rows)
 
     def _fitted(self) -> list[str]:
-        """Name what was fitted to the print in this run."""
+        """Return the names of the parameters of this run that were fitted to the print."""
         found = ["weights of the sliding surface and of LQG, and S_vv (control.py)"]
         if self.wind is None:
             found.append("parameters of the wind (calibrate.py)")

@@ -40,7 +40,7 @@ BEYOND: dict[str, Row] = {
     "SMC, actuator 20 ms": {"controller": "smc", "actuator": 0.02},
     "SMC, actuator 100 ms": {"controller": "smc", "actuator": 0.1},
 }
-"""Gain laws of chapter 4 on the tall building, and actuator dynamics (asked for in 5.2)."""
+"""Gain laws of chapter 4 on the tall building, and actuator dynamics (proposed in 5.2)."""
 
 VARIANTS = {"realism": REALISM, "beyond": BEYOND}
 SHOWN = ("J1", "J3", "J5", "J6", "J7", "J9", "J11", "J12", "sigma_u", "max_u", "max_xm")

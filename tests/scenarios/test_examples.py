@@ -1,4 +1,4 @@
-"""The scripts that a user copies: their commands run, and their numbers are right."""
+"""The scripts that a user copies: their commands run, and their numbers agree with independent ones."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ def test_start_values_from_the_command_line(
         assert words in capsys.readouterr().err
 
 
-def test_units_of_the_plant_are_heeded() -> None:
-    """0.4e-3 kN s/m are 0.4 N s/m, limited to 8 N: the energy says what force the plant got, in N."""
+def test_the_force_is_converted_to_the_plants_unit() -> None:
+    """0.4e-3 kN*s/m are 0.4 N*s/m, limited to 8 N: the energy shows the force on the plant in N."""
     result = external_plant.Study(stop=10.0).run()
     F, v = result["control.F"], result["plant.v"]
     assert np.array_equal(F, np.clip(-0.4e-3 * v, -8e-3, 8e-3))
     assert result.units["control.F"] == "kN"
-    # energy of (14 m, 25 m/s) less what the damper took: m = 1 kg, k = 0.01 N/m, c = 0.001 N s/m
+    # energy of (14 m, 25 m/s) less the work of the damper: m = 1 kg, k = 0.01 N/m, c = 0.001 N*s/m
     energy = 0.5 * v**2 + 0.5 * 0.01 * result["plant.x"] ** 2
     taken = 1e3 * F[:-1] * np.diff(result["plant.x"]) - 0.001 * 0.5 * (v[1:] ** 2 + v[:-1] ** 2) * 0.01
     # the force is held, so its work over a step is exact; the trapezium of v^2 is off by h^2 / 12
@@ -130,4 +130,6 @@ def test_another_controller_in_the_same_file(tmp_path: Path, monkeypatch: pytest
     main(["run", "loop.ssp", "--replace", "control=mine.py:Mine", "--no-figures", "--out", "mine"])
     main(["run", "loop.ssp", "--no-figures", "--out", "own"])
     runs = [Result.load(Path(name) / "result.npz")["building.x"] for name in ("mine", "own")]
-    assert np.abs(runs[0] - runs[1]).max() <= 1e-12 * np.abs(runs[1]).max()  # kN by two ways: the last bits
+    assert (
+        np.abs(runs[0] - runs[1]).max() <= 1e-12 * np.abs(runs[1]).max()
+    )  # two conversions from kN, which differ in the last bits

@@ -1,4 +1,4 @@
-"""The command line: what it prints and writes, and the errors that end with exit code 2."""
+"""The command line: its output, its files, and the errors that end with exit code 2."""
 
 import json
 import os
@@ -9,7 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from cosim.cli.app import main
+from tests.cosim.cli.command import call
 
 SCENARIO = '''
 """A mass that is braked."""
@@ -80,15 +80,6 @@ def scenario(tmp_path):
     return str(path)
 
 
-def call(*arguments):
-    """Run the command line in this process; return its exit code."""
-    try:
-        main([str(a) for a in arguments])
-    except SystemExit as end:
-        return end.code or 0
-    return 0
-
-
 def refused(capsys, *arguments):
     """Run a command that must end with exit code 2 and one screen of text; return the text."""
     code = call(*arguments)
@@ -100,7 +91,7 @@ def refused(capsys, *arguments):
     return text
 
 
-def test_run_of_a_users_file_writes_numbers_result_and_says_where(scenario, tmp_path, capsys):
+def test_a_run_of_a_users_file_writes_metrics_and_result_and_names_the_folder(scenario, tmp_path, capsys):
     assert call("run", scenario, "--b", 3.0, "--out", tmp_path / "out") == 0
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert metrics["options"] == {"b": 3.0, "stop": 2.0}
@@ -159,7 +150,7 @@ def test_a_study_that_is_not_a_dataclass_or_needs_an_option(tmp_path, capsys):
 
 
 def test_list_names_the_scenarios(capsys):
-    """Every study is listed; modules that only help a study are not."""
+    """Every study is listed, and no module that studies share."""
     assert call("list") == 0
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     assert {"chattering", "tall_building", "highway_bridge", "external_plant"} <= set(names)
@@ -197,7 +188,7 @@ def test_a_scenario_that_returns_something_else_is_refused(tmp_path, capsys, old
 
 
 @pytest.mark.parametrize("name", ["random", "json", "numpy"])
-def test_a_file_named_like_a_module_takes_no_modules_place(tmp_path, name):
+def test_a_file_named_like_a_module_does_not_replace_it(tmp_path, name):
     """The file imports the module that it is named after; later imports find the module, too."""
     path = tmp_path / f"{name}.py"
     path.write_text(
@@ -251,7 +242,7 @@ def test_table_as_json_is_a_list_of_rows(capsys):
     assert {"case", "gain", "coupling", "norm_u", "mean_sgn"} <= rows[0].keys()
 
 
-def test_json_has_null_where_a_number_is_not_finite(tmp_path, capsys):
+def test_a_table_as_json_has_null_where_a_number_is_not_finite(tmp_path, capsys):
     path = tmp_path / "tabled.py"
     rows = "[{'a': 1.5, 'b': float('nan'), 'c': 'x'}, {'a': float('inf'), 'b': 2, 'c': None}]"
     path.write_text(f"def table():\n    return {rows}\n")
@@ -271,7 +262,7 @@ def test_export_and_inspect(scenario, tmp_path, capsys):
     assert line.split()[:9] == ["v", "Real", "output", "m/s", "2.0", "-", "continuous", "-", "-"]
 
 
-def test_inspection_shows_bounds_and_escapes_what_would_control_the_terminal(scenario, tmp_path, capsys):
+def test_inspection_shows_bounds_and_escapes_control_characters(scenario, tmp_path, capsys):
     """The brake's damping has min = 0; a description with an escape sequence is shown as text."""
     path = tmp_path / "brake.fmu"
     assert call("export", f"{scenario}:brake", "--out", path) == 0

@@ -30,8 +30,9 @@ from cosim import (
 )
 from cosim.blocks import TableSource
 from cosim.cli.app import main
-from cosim.cli.fmu_scenario import fmu_study
+from cosim.cli.fmu_scenario import FMUStudy
 from cosim.cli.input_table import connect_inputs
+from cosim.cli.scenario import study_of_file
 from fmus.export import DefaultExperiment, export
 from tests.cosim.fmi.ball import ball
 from tests.cosim.fmi.crash import crash
@@ -53,7 +54,7 @@ def folder(tmp_path_factory):
 
 
 def test_a_table_between_its_rows_at_its_rows_and_outside():
-    """0.1 k is below 0.3 and 0.7 in floats at some k; a row there counts all the same."""
+    """As floats, 0.1 k is below 0.3 and 0.7 at some k; a row at these instants counts all the same."""
     t = [0.25, 0.3, 0.7, 0.7, 1.05]
     rows = np.array([[1.0, 5.0], [2.0, 4.0], [3.0, 3.0], [-1.0, 2.0], [0.4, 1.0]])
     parts = {"linear": TableSource(t, rows, unit="N"), "held": TableSource(t, rows, interpolation="hold")}
@@ -86,7 +87,7 @@ def test_inputs_from_a_file_are_those_of_a_source(folder, tmp_path):
     """An element and an array: the run of the same table as a block, bit for bit."""
     (tmp_path / "in.csv").write_text('time,"u[2]"\n0,0\n0.45,1.5\n0.45,-1\n\n0.9,0.5\n')
     options = {"stop": 1.0, "step": 0.05, "record": ("a", "u")}
-    found = fmu_study(folder / "chain.fmu")(input=tmp_path / "in.csv", **options).run()
+    found = study_of_file(FMUStudy, folder / "chain.fmu")(input=tmp_path / "in.csv", **options).run()
     source = TableSource([0.0, 0.45, 0.45, 0.9], [0.0, 1.5, -1.0, 0.5])
     system = System({"chain": FMU(folder / "chain.fmu"), "s": source}, [("s.y", "chain.u[2]")])
     wanted = simulate(system, step=0.05, stop=1.0, record=["chain.a", "chain.u"])
@@ -94,7 +95,7 @@ def test_inputs_from_a_file_are_those_of_a_source(folder, tmp_path):
         assert np.array_equal(found[name], wanted[name])
     assert np.ptp(found["chain.u"][:, 1]) > 2.0
     (tmp_path / "array.csv").write_text("time, u\n0, 0 0\n0.45, 0 1.5\n0.45, 0 -1\n0.9, 0 0.5\n")
-    again = fmu_study(folder / "chain.fmu")(input=tmp_path / "array.csv", **options).run()
+    again = study_of_file(FMUStudy, folder / "chain.fmu")(input=tmp_path / "array.csv", **options).run()
     assert np.array_equal(found["chain.a"], again["chain.a"])
 
 
@@ -102,10 +103,10 @@ def test_discrete_inputs_are_held(folder, tmp_path):
     """Booleans by word, enumerations by number, an alias by its other name."""
     text = "time,b_in,e_in,i_in,r_other\n0,true,1,-5,0\n0.5,FALSE,2,7,1\n"
     (tmp_path / "in.csv").write_text(text)
-    study = fmu_study(folder / "probe.fmu")
+    study = study_of_file(FMUStudy, folder / "probe.fmu")
     record = ("b_out", "e_out", "i_out", "r_out")
     result = study(input=tmp_path / "in.csv", stop=1.0, step=0.25, record=record).run()
-    # row of the file that is latched at t_k-1, with which y_k is computed; at t_0 what it starts with
+    # row of the file that is latched at t_k-1 and gives y_k; the first row gives y_0
     late = [0, 0, 0, 1, 1]
     for name, values in (("b_out", (0, 1)), ("e_out", (1, 2)), ("i_out", (-4, 8))):
         assert list(result[f"probe.{name}"]) == [values[row] for row in late], name
@@ -121,12 +122,12 @@ def test_discrete_inputs_are_held(folder, tmp_path):
         ("time,w\n0,1\n", r"chain\.fmu has no input 'w'"),
         ("time,x\n0,1\n", r"chain\.fmu has no input 'x'"),
         ('time,"u[3]"\n0,1\n', r"outside shape \(2,\)"),
-        ("time,u\n0,1 2\n1\n", r"in\.csv:3: 1 cells, and the header has 2"),
+        ("time,u\n0,1 2\n1\n", r"in\.csv:3: the row has 1 cells, the header has 2"),
         ("time,u\n0,1 2\n1,1\n", r"in\.csv:3: u takes 2 numbers"),
         ("time,u\n0,1 x\n", r"in\.csv:2: u is 'x', which is not a finite number"),
         ("time,u\n0,1 nan\n", "which is not a finite number"),
         ("time,u\n1,1 1\n0,1 1\n", r"in\.csv:3: time 0 s comes after 1 s"),
-        ("time,u,u\n0,1 1,1 1\n", "there are two columns u"),
+        ("time,u,u\n0,1 1,1 1\n", "column u occurs twice"),
         ('time,"u\n0,1 1\n', "is not a CSV file"),
         (
             "time,u\n0,0 9007199254740993\n",
@@ -210,7 +211,7 @@ class Mixer(LinearContinuous):
 
 def test_a_matrix_is_given_row_by_row(tmp_path):
     path = export(Mixer(), tmp_path / "mixer.fmu", fmi_version="3.0")
-    study = fmu_study(path)
+    study = study_of_file(FMUStudy, path)
     result = study(stop=1.0, step=0.5, start=("A=1 2 3, 4 5 6", "u=1 10 100"), record=("x",)).run()
     assert result["mixer.x"][-1] == pytest.approx([321.0, 654.0], rel=1e-15)
     with pytest.raises(FMUError, match=r"A = \[1\.0, 2\.0\] does not fit type Float64 of shape \(2, 3\)"):

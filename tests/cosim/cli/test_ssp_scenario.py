@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim import Result
-from cosim.cli.app import main
+from tests.cosim.cli.command import call
 
 SCENARIO = '''
 """A mass that is braked at every second point."""
@@ -67,15 +67,6 @@ def folder(tmp_path, monkeypatch, capsys):
     return tmp_path
 
 
-def call(*arguments):
-    """Run the command line in this process; return its exit code."""
-    try:
-        main([str(a) for a in arguments])
-    except SystemExit as end:
-        return end.code or 0
-    return 0
-
-
 def velocity(folder):
     return Result.load(folder / "out" / "loop" / "result.npz")["mass.v"]
 
@@ -98,7 +89,7 @@ def test_a_file_runs_as_its_scenario_does(folder):
 
 @pytest.mark.parametrize("part", ["braking.py:Harder", "braking:Harder"])
 def test_a_controller_from_the_command_line(folder, part, monkeypatch):
-    """A class acts with the period of what it replaces."""
+    """A class acts with the period of the component that it replaces."""
     monkeypatch.syspath_prepend(str(folder))
     assert call("run", "loop.ssp", "--replace", f"brake={part}") == 0
     assert np.array_equal(velocity(folder), reference(folder, "--harder"))

@@ -1,4 +1,4 @@
-"""A package of SSP with the FMUs of the tests in it."""
+"""A package of SSP that contains the FMUs of the tests."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def fmus(tmp_path_factory):
 
 @pytest.fixture
 def package(tmp_path, fmus):
-    """Write an SSP: valid by the schema unless it is meant not to be."""
+    """Return a function that writes an SSP, which the schema validates unless valid=False."""
 
     def write(body, after="", files=None, version="1.0", valid=True):
         text = (

@@ -1,4 +1,4 @@
-"""Every error that an SSP file can cause in the reader: it says where, what, and the remedy."""
+"""Every error that an SSP file can cause in the reader: each names the place, the fault and the remedy."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_what_is_not_supported_is_named(package, body, message):
 
 
 def one(parameter, **more):
-    """A gain, or another FMU, with one parameter."""
+    """Return a gain, or another FMU, with one parameter."""
     values = f'<ssv:ParameterSet version="1.0" name="set">{inside(parameter)}</ssv:ParameterSet>'
     return system(component("g", more.get("fmu", "Gain"), GAIN, bindings(binding(values))))
 
@@ -82,7 +82,7 @@ def inside(parameter):
 
 
 def mapped(entry):
-    """A gain whose parameter K comes through a mapping from the number or text of `set.ssv`."""
+    """Return a gain whose parameter K comes through a mapping from the number or text of `set.ssv`."""
     mapping = f'<ssm:ParameterMapping version="1.0" {SPACES}>{entry}</ssm:ParameterMapping>'
     inner = f"<ssd:ParameterMapping>{mapping}</ssd:ParameterMapping>"
     return system(component("g", "Gain", GAIN, bindings(binding(inner, source="set.ssv"))))
@@ -101,7 +101,7 @@ def connectors(*kinds):
 
 
 def nested(wiring, outer="", kinds=("in input", "out output")):
-    """A gain g, and a system sub with a gain in it."""
+    """Return a gain g, and a system sub that contains a gain."""
     sub = system(component("k", "Gain", GAIN), wiring, before=connectors(*kinds), name="sub")
     return system(component("g", "Gain", GAIN) + sub, outer)
 
@@ -138,7 +138,7 @@ UNSUITABLE = [
     ),
     (
         nested(connection("in", "k.x", NOTE.format(DELAY)), connection("g.u", "sub.in")),
-        r"g\.u -> sub\.in -> sub\.k\.x is delayed on a part of its way, .*; delay a direct connection",
+        r"g\.u -> sub\.in -> sub\.k\.x is delayed on part of its path, .*; delay a direct connection",
     ),
     (system(component("g", "Gain", GAIN, NOTE.format(EVERY))), r"component g: '2\.5' must be a whole number"),
     (

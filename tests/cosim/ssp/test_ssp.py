@@ -62,7 +62,7 @@ def test_nested_systems_are_flattened(package):
     assert built.participants["sum"].start_values() == {"x": [1.0]}
 
 
-def test_signal_dictionaries_join_what_refers_to_them(package):
+def test_signal_dictionaries_join_their_references(package):
     dictionary = (
         '<ssd:SignalDictionaries><ssd:SignalDictionary name="bus">'
         f'<ssb:SignalDictionary version="1.0"><ssb:DictionaryEntry name="force">{REAL}'
@@ -179,7 +179,7 @@ def test_the_experiment_and_the_interface(package):
 
 
 def test_a_component_without_a_usable_fmu_can_be_replaced(package):
-    """Its FMU is not even looked at."""
+    """The FMU of the component is not read."""
     gone = component("g", "gone", GAIN) + component("s", "Integrator", SUM)
     path = package(system(gone, connection("g.u", "s.u") + connection("s.y", "g.x")))
     with pytest.raises(CosimError, match=r"component g: the package has no file 'resources/gone\.fmu'"):

@@ -1,4 +1,4 @@
-"""What acts on the plant in cases 3 and 4, by the statistics of the signal itself."""
+"""The disturbances of the plant in cases 3 and 4, by the statistics of the signals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scenarios.chattering.study import Study
 
 
 def disturbance(case: int) -> Array:
-    """Return what is added to x2' at the 4001 points of a run."""
+    """Return the disturbance of x2' at the 4001 points of a run."""
     system = Study(case=case).build()
     return simulate(system, step=0.01, stop=40.0, record=["total.y"])["total.y"]
 

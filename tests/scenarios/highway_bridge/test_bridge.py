@@ -25,7 +25,7 @@ FILES = {"el-centro": "Elcentro", "chi-chi": "Chichi084", "northridge": "Rinadi"
 
 
 def dense(bridge, name):
-    """A matrix of the plant back from its stored upper triangle."""
+    """Return a matrix of the plant from its stored upper triangle."""
     n = len(bridge.M)
     A = np.zeros((n, n))
     start, row = bridge.A_start.astype(int), bridge.A_row.astype(int)
@@ -37,7 +37,7 @@ def dense(bridge, name):
 
 @cache
 def uncontrolled(model, name, step, stop=None, folder=None):
-    """Response from rest: midspan, bearings, moments, curvatures, energy."""
+    """Return the response from rest: midspan, bearings, moments, curvatures, energy."""
     bridge = (
         highway_bridge()
         if model == "reduced"
@@ -147,7 +147,7 @@ def test_full_model_reproduces_the_benchmark(name):
 @pytest.mark.parametrize("name", ["northridge", "chi-chi"])
 def test_located_events_differ_from_late_ones_as_much_as_one_step_overshoots(name):
     """Base shear, moment, displacement, acceleration and bearing within 2 %, curvature within 5 %: a
-    column that yields a step of 2 ms late carries 1 MN m more, and is bent less."""
+    column that yields a step of 2 ms late carries 1 MN*m more, and is bent less."""
     late, exact = full_model(name, late=True), full_model(name, late=False)
     for port, columns, bound in (
         ("y", slice(None), 0.02),

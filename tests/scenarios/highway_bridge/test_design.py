@@ -1,4 +1,4 @@
-"""Numbers that design the bridge and its control, by what they do: damping, base shear, weight of force."""
+"""The numbers of the bridge and its control, by their effects: damping, base shear, weight of force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from scenarios.highway_bridge.study import Study
 def test_damping_is_5_percent_at_two_frequencies() -> None:
     """The benchmark's Rayleigh damping: 5 % at 1.418 and 1.742 Hz, given to four digits.
 
-    C = alpha M + beta K but for soil and bearings, which touch a few freedoms: medians leave them out.
+    C = alpha M + beta K except at soil and bearings, which affect a few degrees of freedom: medians
+    leave these out.
     """
     model = highway_bridge().linear_model()
     M = model.M if model.M.ndim == 2 else np.diag(model.M)

@@ -9,7 +9,7 @@ import pytest
 
 from cosim import Result, SimulationError, simulate
 from scenarios.highway_bridge.bridge import EI, M_Y, SEGMENT
-from scenarios.highway_bridge.criteria import NAMES, WEIGHT, Equipment, base_shears, criteria, response
+from scenarios.highway_bridge.criteria import NAMES, WEIGHT, Equipment, criteria, response
 from scenarios.highway_bridge.study import Study, simulate_bridge
 
 
@@ -115,14 +115,6 @@ def test_a_network_that_does_not_learn_keeps_its_weights() -> None:
         system = replace(study, controller=controller).build()
         f = simulate(system, step=0.005, stop=5.0, record=["control.f"])["control.f"]
         assert bool(np.any(f != 0.0)) is learns
-
-
-def test_base_shear_is_of_the_lowest_segment_in_both_planes() -> None:
-    """Moments numbered by sample 1: 2 columns of 3 segments, 2 planes, 2 ends."""
-    m = np.arange(1.0, 25.0)[None, :]
-    result = Result(np.array([0.0]), {"bridge.force": np.hstack([np.zeros((1, 16)), m])}, {})
-    # column 1: segment 3 has the ends 9 + 10 and 11 + 12; column 2: 21 + 22 and 23 + 24
-    assert base_shears(result)[0] * SEGMENT == pytest.approx([19.0, 23.0, 43.0, 47.0])
 
 
 def test_an_error_of_convergence_names_element_time_and_residual():

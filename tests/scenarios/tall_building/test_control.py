@@ -1,4 +1,4 @@
-"""Numbers that design the tower's control, by what they do: weights, force, filter."""
+"""The numbers of the tower's control, by their effects: weights, force, filter."""
 
 from __future__ import annotations
 

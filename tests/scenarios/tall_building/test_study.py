@@ -95,8 +95,8 @@ def test_limits_and_orderings_in_a_short_run() -> None:
         assert found["filtered-smc"][name] < found["smc"][name]
 
 
-def test_ideal_blocks_switched_on_change_nothing_much() -> None:
-    """Saturation that is never reached changes nothing at all; 24 bits change the eighth digit only."""
+def test_ideal_blocks_change_almost_nothing() -> None:
+    """A limit that is never reached changes nothing; 24 bits resolve 2.4e-7 m/s^2, which 1e-4 covers."""
     base = Study(duration=30.0, record=False)
     plain = base.run().criteria()
     limited = replace(base, saturation=True).run().criteria()
@@ -142,7 +142,7 @@ def test_weights_are_of_the_states_that_they_name() -> None:
         assert x @ w.matrix(model) @ x == pytest.approx(cost, rel=1e-10)  # order of summation
 
 
-def test_figures_have_labels_with_units_and_show_what_they_say() -> None:
+def test_figures_have_labels_with_units_and_show_their_signals() -> None:
     study = Study(duration=20.0, profile=True)
     result = study.run()
     found = study.figures(result)

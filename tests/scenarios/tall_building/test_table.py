@@ -62,7 +62,7 @@ def test_the_print_against_itself() -> None:
     assert text.endswith("proves little: nothing")
 
 
-def test_a_worse_filtered_control_is_told() -> None:
+def test_a_worse_filtered_control_is_reported() -> None:
     """J3 of filtered SMC above LQG and unfiltered J12 below the filtered one."""
     rows = changed(1.1, "filtered-smc", 1.065, "J3")
     before = [wins_over_lqg(printed_rows(), e) for e in STIFFNESS_ERRORS]
@@ -106,8 +106,8 @@ def test_rows_and_text_of_the_variants(study: str) -> None:
     assert "Of 10 cases" in text
 
 
-def test_broken_limits_and_unstable_cases_are_told() -> None:
-    """Cases with known criteria: one as it should be, one outside two limits, one that diverged."""
+def test_broken_limits_and_unstable_cases_are_reported() -> None:
+    """Cases with known criteria: one within all limits, one outside two of them, one that diverged."""
     fine = dict.fromkeys(NAMES, 1.0)
     cases = {"fine": fine, "wild": fine | {"max_u": 301.0, "max_xm": 96.0}, "lost": dict.fromkeys(NAMES)}
     rows = [
