@@ -1,7 +1,7 @@
 """FMI 3.0: arrays as arrays, and the same answers to misuse as in FMI 2.0.
 
-What both versions share (evaluation, states, derivatives) is one core, tested through FMI 2.0;
-here is what the front end of FMI 3.0 adds.
+Both versions share one core (evaluation, states, derivatives), which is tested through FMI 2.0;
+these are the tests of the front end of FMI 3.0.
 """
 
 from __future__ import annotations
@@ -301,7 +301,7 @@ def test_model_exchange_in_fmpy(fmu_of: Callable[..., Path]) -> None:
 
 
 def test_co_simulation_in_fmpy_with_array_parameters(fmu_of: Callable[..., Path]) -> None:
-    """A building twice as heavy and as stiff moves the same under its ground."""
+    """A building that is twice as heavy and twice as stiff has the same response to the ground."""
     path = str(fmu_of("building", "3.0"))
     start = {"ground_acceleration": 1.0}
     options: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""The across-wind load: what it is declared to be, and the printed uncontrolled figures."""
+"""The across-wind load against its declared statistics, and the printed uncontrolled figures."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ TRIBUTARY = 0.5 * (HEIGHTS + np.append(HEIGHTS[1:], 0.0))
 
 
 def test_same_seed_same_load_another_seed_another() -> None:
-    """Bit for bit: results are compared over machines by seed."""
+    """Bit for bit, since results of several machines are compared by seed."""
     a, b, other = (across_wind(STORY_HEIGHTS, 60.0, seed) for seed in (5, 5, 6))
     assert np.array_equal(a, b)
     assert a.shape == (601, 76)
