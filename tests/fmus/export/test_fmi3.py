@@ -20,7 +20,7 @@ from fmpy import read_model_description, simulate_fmu
 
 from cosim import Array, Continuous, Input, Output, State
 from fmus.export import export
-from tests.fmus.export.host import ERROR, OK, Accumulator, building, convert
+from tests.fmus.export.host import ERROR, OK, Accumulator, building, convert, library
 from tests.fmus.export.linear import EXACT, linear_building, linear_oscillator, relative
 
 LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
@@ -103,10 +103,7 @@ def host3(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[[str
 
     def give(name: str) -> Host3:
         path = fmu_of(name, "3.0")
-        with zipfile.ZipFile(path) as archive:
-            library = next(n for n in archive.namelist() if n.startswith("binaries/"))
-            place = archive.extract(library, tmp_path / str(len(hosts)))
-        hosts.append(Host3(path, ctypes.CDLL(place)))
+        hosts.append(Host3(path, library(path, tmp_path / str(len(hosts)))))
         return hosts[-1]
 
     yield give

@@ -102,13 +102,8 @@ def test_user_records(tmp_path: Path) -> None:
     time, force = np.arange(5) * 0.25, np.arange(15.0).reshape(5, 3) * 1e3
     np.savez(tmp_path / "w.npz", time=time, force=force)
     np.savetxt(tmp_path / "w.csv", np.column_stack([time, force]), delimiter=",")
-    np.savetxt(
-        tmp_path / "titled.csv",
-        np.column_stack([time, force]),
-        delimiter=",",
-        header="time,1,2,F",
-        comments="",
-    )
+    titles = {"header": "time,1,2,F", "comments": ""}
+    np.savetxt(tmp_path / "titled.csv", np.column_stack([time, force]), delimiter=",", **titles)
     for name in ("w.npz", "w.csv", "titled.csv"):
         got, dt = load_forces(tmp_path / name, 3)
         np.testing.assert_array_equal(got, force)
