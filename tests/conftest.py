@@ -1,4 +1,4 @@
-"""For all tests: one line that says where the comparison with the benchmark's data is left out."""
+"""For all tests: a generator of random numbers, and a header line about the benchmarks' data."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,8 @@
-"""Mistakes that the tests must see: `python -m tests.mutants [--only NAME]`.
+"""Mistakes that the tests must catch: `python -m tests.mutants [--only NAME]`.
 
-Each mutant changes one text in a copy of the tree, and the test that is named with it must fail
-there. All of them once passed every ordinary test of their area. `tests/test_mutants.py` asserts
-that the texts still stand in the sources, and runs the whole list under `long`.
+Each mutant changes one text in a copy of the tree, and its test must fail there. All of them once
+passed every ordinary test of their area. `tests/test_mutants.py` asserts that the sources still
+contain the texts, and runs the whole list under `long`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TREES = ("cosim", "controllers", "fmus", "scenarios", "tests", "pyproject.toml")
 
 @dataclass(frozen=True)
 class Mutant:
-    """A text that stands once in a file, its replacement, and the test that sees the difference."""
+    """A text that occurs once in a file, its replacement, and the test that catches the change."""
 
     name: str
     path: str
@@ -183,7 +183,7 @@ def killed(mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, bool]]:
             else:
                 shutil.copy(ROOT / name, tree / name)
         if not passes(tree, sorted({m.test for m in mutants})):
-            raise RuntimeError("the tests fail without a mutant; mend that first")
+            raise RuntimeError("the tests fail without a mutant; correct that first")
         for mutant in mutants:
             file = tree / mutant.path
             original = file.read_text()
@@ -193,7 +193,7 @@ def killed(mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, bool]]:
 
 
 def main() -> None:
-    """Print a line for each mutant; exit with 1 where one survives."""
+    """Print a line for each mutant; exit with 1 if one survives."""
     parser = argparse.ArgumentParser(description="Run each mutant against the test that must see it.")
     parser.add_argument("--only", action="append", metavar="NAME", help="a part of a mutant's name")
     only = parser.parse_args().only

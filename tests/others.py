@@ -1,7 +1,7 @@
-"""Tools of other people: those that we compare with, and plants that pythonfmu made.
+"""Other projects: tools for comparison, and plants exported by pythonfmu.
 
-The libraries that pythonfmu (FMI 2.0) and pythonfmu3 (FMI 3.0) write look for the Python that runs
-in the process, so they work where CPython is the master.
+The libraries of pythonfmu (FMI 2.0) and pythonfmu3 (FMI 3.0) use the Python interpreter of the
+process, so they work where CPython is the master.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Swing{n}(Fmi{n}Slave):
 
 
 def tool(load: Callable[[], ModuleType]) -> ModuleType:
-    """Import a tool of fmus.packaging.other_tools, or skip the test and say in one line why."""
+    """Import a tool of fmus.packaging.other_tools, or skip the test with the reason in one line."""
     try:
         return load()
     except CosimError as error:
@@ -50,7 +50,7 @@ def tool(load: Callable[[], ModuleType]) -> ModuleType:
 
 
 def swing(folder: Path, version: str) -> Path:
-    """Have the tool make the FMU in a folder."""
+    """Export the FMU with the tool of its version; return its path."""
     n = version[0]
     package, Real = {"2": ("pythonfmu", "Real"), "3": ("pythonfmu3", "Float64")}[n]
     time = 'self.register_variable(Float64("time", causality=Causality.independent))' if n == "3" else ""

@@ -1,4 +1,4 @@
-"""The processes of this machine, for tests that start some."""
+"""The processes of the machine, for tests that start some."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def children(parent: int) -> set[int]:
-    """Return the processes that a process has started and not waited for, zombies too."""
+    """Return the children of a process, zombies included."""
     found = set()
     for entry in Path("/proc").glob("[0-9]*/stat"):
         try:

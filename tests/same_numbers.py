@@ -1,4 +1,4 @@
-"""Hashes of what the studies, an SSP and every exported class compute: `python -m tests.same_numbers`.
+"""Hashes of the results of the studies, an SSP and every exported class: `python -m tests.same_numbers`.
 
 Run it before and after a change that must not alter a result; the two outputs must be equal,
 bit for bit, on one machine. Options: --only PART, several times, of the parts in PARTS.
@@ -88,7 +88,7 @@ PARTS: dict[str, Callable[[], Iterator[tuple[str, str]]]] = {
 
 
 def main() -> None:
-    """Print a line a result, and one hash a part."""
+    """Print one line per result, and one hash per part."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", action="append", choices=list(PARTS))
     warnings.simplefilter("ignore")

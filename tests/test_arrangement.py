@@ -50,7 +50,7 @@ def test_rooms_of_the_tests_are_rooms_of_the_packages() -> None:
 
 
 def test_a_test_module_imports_no_other() -> None:
-    """Shared parts stand in files without `test_`, so that importing one does not collect its tests again."""
+    """Shared parts are in files without `test_`, so that importing one does not collect its tests again."""
     names = {(module, name) for module, tree in TREES.items() for name in imported(tree)}
     own = {(module, name) for module, name in names if name.startswith("tests.")}
     assert own

@@ -93,7 +93,7 @@ def test_model_exchange_of_both_versions(tmp_path: Path, options: dict[str, obje
     assert np.abs(runs[0]["plant.x"] - wanted).max() < bound * np.abs(wanted).max()
 
 
-# what the tests of FMI 2.0 show, and FMI 3.0 shares by one core, shown for 3.0 itself
+# properties that FMI 2.0's tests show, and that FMI 3.0 shares through one core, tested for 3.0 as well
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_the_structure_is_the_same_in_both_versions(buildings: dict[str, Path]) 
 
 
 def test_reset_and_many_instances(buildings: dict[str, Path], tmp_path: Path) -> None:
-    """FMI 3.0: after a reset the run is the same bit for bit, as it is in an instance beside it."""
+    """FMI 3.0: after a reset the run is the same bit for bit, and the same as in another instance."""
     description = fmpy.read_model_description(str(buildings["3.0"]))
     reference = {v.name: v.valueReference for v in description.modelVariables}
     fmpy.extract(str(buildings["3.0"]), str(tmp_path))

@@ -1,4 +1,4 @@
-"""The list of mutants holds: each text stands once in its file, and each is killed by its test."""
+"""The list of mutants is valid: each text occurs once in its file, and its test kills the mutant."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.mutants import MUTANTS, ROOT, Mutant, killed
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda m: m.name)
 def test_a_mutant_can_be_made(mutant: Mutant) -> None:
-    """Code that was rewritten needs its mutant rewritten, too, in tests/mutants.py."""
+    """When code is rewritten, its mutant in tests/mutants.py must be rewritten too."""
     assert (ROOT / mutant.path).read_text().count(mutant.text) == 1
     assert mutant.replacement != mutant.text
     path, _, name = mutant.test.partition("::")

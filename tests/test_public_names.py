@@ -1,4 +1,4 @@
-"""What a user imports: everything from public rooms, which our own studies and README show."""
+"""Public names: studies, controllers and READMEs import from public rooms only, as a user does."""
 
 from __future__ import annotations
 

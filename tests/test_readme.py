@@ -1,4 +1,4 @@
-"""The scripts of README.md and cosim/README.md run as they stand there."""
+"""The scripts of README.md and cosim/README.md run unchanged."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.readme import ROOT, code_blocks, run
 
 
 def test_the_building_of_the_readme(tmp_path):
-    """The brace lowers the drift; without it there is no force. The schedule says what is an FMU."""
+    """The brace lowers the drift; without it the force is zero. The schedule marks the FMU."""
     (script,) = code_blocks(ROOT / "README.md")
     free, braced, *schedule = run(script, tmp_path)
     drift = [float(line.partition("drift ")[2].partition(" mm")[0]) for line in (free, braced)]

@@ -20,20 +20,20 @@ g are learnt while they are used. Numbers are those of the thesis' equations.
 
 Here x_d = 0. A node is added when the input is far from the nearest node and the error of
 the last five samples is large, (3.34) to (3.39); the weakest is dropped when it contributes
-less than E3 of the strongest (3.40). Memory is fixed: there are at most `n_nodes` nodes,
-and `full` counts how often a node was wanted beyond that.
+less than E3 of the strongest (3.40). Memory is fixed: the network has at most `n_nodes`
+nodes, and `full` counts the nodes that could not be added.
 
-Where the print is open or wrong, this is done instead:
-- (3.51) has the signs of w_p and b_p against the sum that it is to cancel, (3.44); here
-  the three terms are cancelled.
-- g starts at zero, and (3.46) drives it below zero wherever s u < 0: u is divided by
+The code differs from the print where that is incomplete or wrong:
+- In (3.51) w_p and b_p have the wrong sign to cancel their terms in (3.44); here all three
+  terms cancel.
+- g starts at zero, and (3.46) drives it below zero wherever s u < 0, so u is divided by
   max(g, g_min). u is in units of u_max, so g is an acceleration.
-- (3.40) compares min phi with max phi. A Mexican hat is negative beyond zeta = 1: sizes
+- (3.40) compares min phi with max phi. A Mexican hat is negative beyond zeta = 1, so sizes
   |phi| are compared. The most central node is never dropped.
-- The width of the triangles of figure 3.3 is not printed: s_max is the peak of the
-  outermost; beyond it they saturate.
-- r falls without end while s differs from zero, also from measurement noise: `leak` r is
-  added to (3.60). With leak = 0 it is as printed.
+- The width of the triangles of figure 3.3 is not printed. s_max is the peak of the outermost
+  triangle, beyond which they saturate.
+- r falls without bound while s differs from zero, even by measurement noise, so `leak` r is
+  added to (3.60). leak = 0 gives the printed equation.
 
 X is sampled at t_k and u is held over [t_k, t_{k+1}]; u in (3.46) to (3.51) is the one held
 over [t_{k-1}, t_k], after the actuators' limit.
@@ -81,7 +81,7 @@ class SCWNN(Block):
     u = Output("forces", unit="N", shape="p")
     s = Output("sliding variables", shape="p")
     nodes = Output("number of nodes", unit="1")
-    full = Output("how often a node was wanted beyond n_nodes", unit="1")
+    full = Output("number of nodes that could not be added", unit="1")
     f = Output("estimate of f", unit="m/s^2", shape="p")
     r = Output("fuzzy compensation", shape="p")
 
@@ -138,19 +138,24 @@ def distance2(self: Any, i: int) -> float:
     return total
 
 
+def squared_zeta(self: Any, i: int) -> float:
+    """Return zeta^2 of node i at X, as in (3.14)."""
+    total = 0.0
+    for m in range(self.X.shape[0]):
+        zeta = (self.X[m] - self.c[i, m]) / self.sigma[i, m]
+        total += zeta * zeta
+    return total
+
+
 def hidden_layer(self: Any) -> None:
     """Write the wavelets at X (3.14); the first sample makes the first two nodes."""
-    n = self.X.shape[0]
     if self.sample == 0.0:
         self.count = 2.0
-        for m in range(n):
+        for m in range(self.X.shape[0]):
             self.c[1, m] = self.X[m]
             self.sigma[0, m] = self.sigma[1, m] = 1.0
     for i in range(node_count(self)):
-        zeta2 = 0.0
-        for m in range(n):
-            zeta = (self.X[m] - self.c[i, m]) / self.sigma[i, m]
-            zeta2 += zeta * zeta
+        zeta2 = squared_zeta(self, i)
         self.phi[i] = _MEXICAN_HAT * (1.0 - zeta2) * exp(-0.5 * zeta2)
 
 
@@ -159,7 +164,7 @@ def control(self: Any, T: float) -> None:
     p, n, nodes = self.x.shape[0], self.X.shape[0], node_count(self)
     for j in range(p):
         s, u = self.s[j], self.u[j] / self.u_max
-        phi2, f, g, u_a = 0.0, 0.0, 0.0, 0.0
+        phi2, f, g = 0.0, 0.0, 0.0
         for i in range(nodes):
             phi = self.phi[i]
             self.w[i, j] += T * s * phi
@@ -174,10 +179,9 @@ def control(self: Any, T: float) -> None:
             X2 += self.X[m] * self.X[m]
         f_p = s * (self.eta_pw * phi2 + self.eta_pb * X2)  # proportional parts of f and g
         g_p = self.eta_pt * s * u * phi2
-        u_a = f_p + g_p * u  # (3.51)
         mu = membership(s / self.s_max)
         self.r[j] -= T * (self.eta_r * s * mu + self.leak * self.r[j])  # (3.60)
-        u_a += self.r[j] * mu  # (3.56)
+        u_a = f_p + g_p * u + self.r[j] * mu  # (3.51), (3.56)
         self.f[j] = f + f_p
         g = max(g + g_p, self.g_min)
         force = (-self.f[j] - self.k1 * self.v[j] - self.k2 * self.x[j] + u_a) / g
@@ -187,14 +191,14 @@ def control(self: Any, T: float) -> None:
 def membership(s: float) -> float:
     """Return mu_sum (3.53) of seven equal triangles over [-1, 1].
 
-    Two neighbours overlap at any s and add up to one, so the weights -1, -2/3, ..., 1 at
-    their peaks are interpolated: mu_sum = s between the outermost peaks.
+    Two neighbours overlap at any s and their sum is one, so mu_sum interpolates the weights
+    -1, -2/3, ..., 1 at their peaks: mu_sum = s between the outermost peaks.
     """
     return min(1.0, max(-1.0, s))
 
 
 def adapt_nodes(self: Any, T: float) -> None:
-    """Adapt centres and widths, (3.48) and (3.49), with the force that is held from now on.
+    """Adapt centres and widths, (3.48) and (3.49), with the force that is held over the next step.
 
     d phi/d zeta^2 = hat exp(-zeta^2/2) (zeta^2 - 3)/2, and zeta^2 = sum ((X - c)/sigma)^2.
     """
@@ -206,10 +210,7 @@ def adapt_nodes(self: Any, T: float) -> None:
             w = self.eta_pw * s * self.phi[i] + self.eta_iw * self.w[i, j]
             theta = self.eta_pt * s * u * self.phi[i] + self.eta_it * self.theta[i, j]
             pull += s * (w + u * theta)
-        zeta2 = 0.0
-        for m in range(n):
-            zeta = (self.X[m] - self.c[i, m]) / self.sigma[i, m]
-            zeta2 += zeta * zeta
+        zeta2 = squared_zeta(self, i)
         slope = _MEXICAN_HAT * exp(-0.5 * zeta2) * 0.5 * (zeta2 - 3.0)
         for m in range(n):
             gap = self.X[m] - self.c[i, m]

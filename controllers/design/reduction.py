@@ -1,6 +1,6 @@
 """Smaller models of large structures.
 
-Static condensation (Guyan): K and M of chosen degrees of freedom, which the others follow
+Static condensation (Guyan): K and M of the kept degrees of freedom, which the others follow
 statically, x = T x_keep.
 
 Dominant modes (Davison), from the thesis' (2.2) to its (2.3): the eigenvalues of A nearest
@@ -14,7 +14,7 @@ and for measured accelerations y = S_y X'
 
     C_r = S_y V_1 Lambda_1 T^-1,  D_r = S_y V_1 (V^-1 B)_1,  F_r = S_y V_1 (V^-1 E)_1    (3)
 
-The thesis prints D_r = 0 in (2.4), although accelerations carry the force; here it is kept.
+The thesis prints D_r = 0 in (2.4), although accelerations carry the force; here D_r is kept.
 
 Modal truncation: the modes of the lowest frequencies are kept.
 
@@ -57,13 +57,13 @@ def static_condensation(M: Array, K: Array, keep: Sequence[int]) -> tuple[Array,
         except la.LinAlgError:
             raise DesignError(
                 "static_condensation: the stiffness of the condensed degrees of freedom is singular; "
-                "keep one of every part that can move without strain"
+                "keep one degree of freedom of every part that can move without strain"
             ) from None
     return T.T @ M @ T, T.T @ K @ T, T
 
 
 def _real_block(vectors: Array, left: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Return real V (N, n), W (n, N), L (n, n) of eigenpairs that contain whole complex pairs."""
+    """Return real V (N, n), W (n, N), L (n, n) of eigenpairs; complex ones must come in pairs."""
     V, W, L = [], [], np.zeros((len(values), len(values)))
     i = 0
     for value, v, w in zip(values, vectors.T, left, strict=True):
@@ -94,8 +94,8 @@ def dominant_modes(
     """Return the model in displacements and velocities of the degrees of freedom `keep`, (1) to (3).
 
     M, C, K (n, n); force (n, m) and disturbance (n, p): forces of a unit u and a unit w;
-    measured: degrees of freedom whose accelerations are measured. Counted from 0. As many
-    modes are kept as degrees of freedom.
+    measured: degrees of freedom whose accelerations are measured, counted from 0. The number of
+    modes is that of the kept degrees of freedom.
     """
     n, k = M.shape[0], len(keep)
     values, vectors = la.eig(first_order(M, C, K))
@@ -104,7 +104,7 @@ def dominant_modes(
     chosen = order[: 2 * k]
     if not np.isclose(values[chosen].imag.sum(), 0.0, atol=1e-6 * np.abs(values[chosen]).max()):
         raise DesignError(
-            f"dominant_modes: {2 * k} states cut a complex pair in two "
+            f"dominant_modes: {2 * k} states split a complex pair "
             f"(eigenvalue {values[chosen[-1]]:.4g}); keep one degree of freedom more or less"
         )
     V, W, L = _real_block(vectors[:, chosen], left[chosen], values[chosen])
@@ -113,7 +113,7 @@ def dominant_modes(
     condition = np.linalg.cond(T / np.linalg.norm(T, axis=0))
     if condition > 1e10:
         raise DesignError(
-            f"dominant_modes: the kept modes cannot be told apart at the degrees of freedom {list(keep)} "
+            f"dominant_modes: the kept modes cannot be distinguished at the degrees of freedom {list(keep)} "
             f"(condition {condition:.1e}); choose others, away from common nodes"
         )
     inputs = np.zeros((2 * n, force.shape[1] + disturbance.shape[1]))
@@ -145,7 +145,7 @@ def modal_state_space(
     """
     if not 1 <= modes <= len(M):
         raise DesignError(
-            f"modal_state_space: {modes} modes; a structure of {len(M)} degrees of freedom has 1 to {len(M)}"
+            f"modal_state_space: modes = {modes} must be between 1 and {len(M)}, the degrees of freedom"
         )
     w2, Phi = la.eigh(K, M, subset_by_index=[0, modes - 1])
     damping = Phi.T @ C @ Phi

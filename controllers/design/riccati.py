@@ -71,7 +71,7 @@ def regulator(
     except (la.LinAlgError, ValueError) as error:
         raise DesignError(
             f"{what}: the Riccati equation has no stabilising solution ({error}); an undamped mode "
-            "is not seen by the weight Q: weight it"
+            "has no weight in Q; add one"
         ) from error
     X = c**2 * Y
     return X, root_inv @ (Bs.T @ X + Ns.T)

@@ -22,13 +22,14 @@ import scipy.linalg as la
 
 from cosim import Array
 
+from .design_model import DesignModel
 from .riccati import DesignError, regulator
 
 
 def optimal_surface(A: Array, B: Array, Q: Array) -> Array:
     """Return P (m, n) of s = P x for x' = A x + B u and the weight Q (n, n)."""
     n, m = B.shape
-    # the m states that the actuators move most directly are x_2
+    # x_2 are the m states that the actuators move most directly
     _, _, order = la.qr(B.T, pivoting=True)
     second = np.sort(order[:m])
     first = np.setdiff1d(np.arange(n), second)
@@ -46,16 +47,17 @@ def optimal_surface(A: Array, B: Array, Q: Array) -> Array:
     At, Qt = D @ A @ D_inv, D_inv.T @ Q @ D_inv
     a, b = slice(0, n - m), slice(n - m, n)
     _, P_1 = regulator(
-        At[a, a],
-        At[a, b],
-        Qt[a, a],
-        0.5 * (Qt[b, b] + Qt[b, b].T),
-        Qt[a, b],
-        what="optimal_surface",
-        names="actuator state",
-        remedy="the surface cannot stabilise it; move the actuator",
-    )
+        At[a, a], At[a, b], Qt[a, a], 0.5 * (Qt[b, b] + Qt[b, b].T), Qt[a, b], what="optimal_surface",
+        names="actuator state", remedy="the surface cannot stabilise it; move the actuator",
+    )  # fmt: skip
     return np.asarray(np.hstack([P_1, np.eye(m)]) @ D)
+
+
+def design_surface(model: DesignModel, Q: Array, what: str) -> tuple[Array, Array, Array]:
+    """Return P of the optimal surface, P A and P B; raise DesignError, naming `what`, if P B is singular."""
+    P = optimal_surface(model.A, model.B, Q)
+    require_regular(P @ model.B, what)
+    return P, P @ model.A, P @ model.B
 
 
 def require_regular(PB: Array, what: str) -> None:

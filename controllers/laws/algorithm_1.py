@@ -4,9 +4,9 @@
     u = -M sgn s                                                            (4.4)
 
 For systems without noise and disturbance. Chapter 4 has rate = 1.1 and M_0 = 100; the sign
-before the first call is 0. The thesis leaves two things open. Here a switch is a strictly
-opposite sign, so that leaving the 0 of the start is not one, and s = 0 keeps the last sign;
-and M has a floor of 1, without which it vanishes within the 40 s of case 1.
+before the first call is 0. The thesis leaves two points open. Here a switch is a change to
+the strictly opposite sign, so the first sign after the start is not a switch, and s = 0 keeps
+the last sign; and M has a floor of 1, without which it vanishes within the 40 s of case 1.
 
 k counts calls. Under stage coupling every stage of the solver is a call, which reproduces
 the printed norms (672 and 765 in cases 1 and 2). s is that of t_k; u is held until the next

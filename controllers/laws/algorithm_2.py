@@ -7,8 +7,8 @@
 
 For systems with noise and disturbance, 0 < alpha < beta. Chapter 4 has M_1 = 1, M_2 = 300,
 M_0 = 150, alpha = 10 and beta = 300 (100 in case 5); the sign before the first call is 0.
-The thesis leaves two things open: here a switch is a strictly opposite sign, and (3)
-applies once in a call, after (1) and (2).
+The thesis leaves two points open: here a switch is a change to the strictly opposite sign,
+and (3) applies once in a call, after (1) and (2).
 
 T_s is the step h of the call. Under stage coupling every stage of the solver is a call with
 the communication step as T_s, which reproduces the printed norms (905, 2491).

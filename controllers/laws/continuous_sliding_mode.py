@@ -3,12 +3,12 @@
     s = P x_hat                                                             (1)
     u = u_eq - delta (P B)' s,  u_eq = -(P B)^-1 P A x_hat                  (2)
 
-With the Lyapunov function V = s' s/2, V' = s' P B (u - u_eq) = -delta |(P B)' s|^2. There is
-no sign function, so nothing chatters. This law stands in for the modified method (MSMC) of
-Wu and Yang (2004) in the thesis' table 2.2, whose equations the thesis does not print.
+With the Lyapunov function V = s' s/2, V' = s' P B (u - u_eq) = -delta |(P B)' s|^2. The law
+has no sign function, so it does not chatter. It takes the place of the modified method (MSMC)
+of Wu and Yang (2004) in the thesis' table 2.2, whose equations the thesis does not print.
 
 x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}]. For one actuator
-(P B)(P B)' = c and s' = -delta c s, so `design` takes that rate.
+(P B)(P B)' = c and s' = -delta c s, so the argument of `design` is the rate delta c.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import matvec, matvec_add
 
 from ..design.design_model import DesignModel
-from ..design.surface_design import optimal_surface, require_regular
+from ..design.surface_design import design_surface
 
 
 class ContinuousSlidingMode(Block):
@@ -47,8 +47,6 @@ class ContinuousSlidingMode(Block):
         rate: least rate of approach to the surface in 1/s; delta = rate/c with the smallest
         eigenvalue c of (P B)(P B)'.
         """
-        P = optimal_surface(model.A, model.B, Q)
-        PB = P @ model.B
-        require_regular(PB, "ContinuousSlidingMode")
+        P, PA, PB = design_surface(model, Q, "ContinuousSlidingMode")
         delta = rate / np.linalg.svd(PB, compute_uv=False)[-1] ** 2
-        return cls(P=P, minus_G=-la.solve(PB, P @ model.A), minus_N=-delta * PB.T, every=every)
+        return cls(P=P, minus_G=-la.solve(PB, PA), minus_N=-delta * PB.T, every=every)

@@ -3,21 +3,19 @@
     s = P x_hat                                                             (2.13)
     u = (P B)^-1 (-P A x_hat + switching),  switching = -M sgn s            (2.15)
 
-(2.15) in two blocks, with a gain law of chapter 4 between them that gives `switching`:
-StateSurface, then Algorithm I or II or another, then EquivalentForce. There is one
+Two blocks compute (2.15), and a gain law of chapter 4 between them computes `switching`:
+StateSurface, then Algorithm I, II or another law, then EquivalentForce. The model has one
 actuator. x_hat is the estimate at t_k; u is held over [t_k, t_{k+1}].
 """
 
 from __future__ import annotations
-
-import numpy as np
 
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import dot
 
 from ..design.design_model import DesignModel
 from ..design.riccati import DesignError
-from ..design.surface_design import optimal_surface, require_regular
+from ..design.surface_design import design_surface
 
 
 class StateSurface(Block):
@@ -51,11 +49,5 @@ def design(model: DesignModel, Q: Array) -> tuple[StateSurface, EquivalentForce]
             f"equivalent_force: the model has {model.B.shape[1]} actuators, but "
             "the gain laws of chapter 4 take one; use SlidingMode"
         )
-    P = optimal_surface(model.A, model.B, Q)
-    PB = P @ model.B
-    require_regular(PB, "equivalent_force")
-    row = np.ascontiguousarray
-    return (
-        StateSurface(P=row(P[0])),
-        EquivalentForce(PA=row((P @ model.A)[0]), PB_inv=1.0 / float(PB[0, 0])),
-    )
+    P, PA, PB = design_surface(model, Q, "equivalent_force")
+    return StateSurface(P=P[0]), EquivalentForce(PA=PA[0], PB_inv=1.0 / float(PB[0, 0]))

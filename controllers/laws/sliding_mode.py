@@ -5,8 +5,8 @@
     u = (P B)^-1 (-P A x_hat - M sgn s),  M = a |s| + delta                 (2.15)
 
 x_hat is the estimate at t_k, from measurements that carry the force held over
-[t_{k-1}, t_k]; u is held over [t_k, t_{k+1}]. In the model the surface is approached at the
-rate a, and only delta chatters. sgn acts on each component of s, |s| is the norm.
+[t_{k-1}, t_k]; u is held over [t_k, t_{k+1}]. In the model, s decays at the rate a and only the
+term delta chatters. sgn acts on each component of s, |s| is the norm.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cosim import Array, Block, Input, Local, Output, Parameter
 from cosim.functions import matvec, norm, sign
 
 from ..design.design_model import DesignModel
-from ..design.surface_design import optimal_surface, require_regular
+from ..design.surface_design import design_surface
 
 
 class SlidingMode(Block):
@@ -46,7 +46,5 @@ class SlidingMode(Block):
         cls, model: DesignModel, Q: Array, a: float = 1.065, delta: float = 0.001, every: int | None = None
     ) -> SlidingMode:
         """Make the controller with the surface that minimises int x' Q x dt, (2.10) to (2.13)."""
-        P = optimal_surface(model.A, model.B, Q)
-        PB = P @ model.B
-        require_regular(PB, "SlidingMode")
-        return cls(P=P, PA=P @ model.A, PB_inv=la.inv(PB), a=a, delta=delta, every=every)
+        P, PA, PB = design_surface(model, Q, "SlidingMode")
+        return cls(P=P, PA=PA, PB_inv=la.inv(PB), a=a, delta=delta, every=every)

@@ -5,9 +5,9 @@
     hys s = sgn s for |s| > width, otherwise as in the last call            (3)
     u = -M_0 sat s  or  -M_0 hys s
 
-The thesis prints (1). It jumps from gamma to 1 at |s| = gamma, and it has a unit only when s
-has none. (2) is the boundary layer of the source, continuous and without unit; the
-parameter `scaled` chooses it. (3) starts at sgn s.
+The thesis prints (1), which jumps from gamma to 1 at |s| = gamma and requires a dimensionless
+s. (2) is the boundary layer of the source, continuous and dimensionless; the parameter
+`scaled` selects it. (3) starts at sgn s.
 
 Source: J.-J. Slotine and S. S. Sastry, Tracking control of non-linear systems using sliding
 surfaces, with application to robot manipulators, International Journal of Control 38 (1983)
@@ -56,7 +56,7 @@ class SaturationControl(Block):
 
 
 class HysteresisControl(Block):
-    """u = -M_0 hys s: it switches only when s has left [-width, width] on the other side."""
+    """u = -M_0 hys s, which switches only when s leaves [-width, width] on the other side."""
 
     DEFAULT_UNITS = {"unit": "N"}
 

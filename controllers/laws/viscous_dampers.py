@@ -1,9 +1,9 @@
-"""Viscous dampers in the place of a controller.
+"""Viscous dampers in place of a controller.
 
     u_j = -c v_j,  |u_j| <= limit                                           (1)
 
 v_j is the velocity across damper j at t_k; the force is limited like that of an actuator
-and held over [t_k, t_{k+1}], so the step must be short against the vibration.
+and held over [t_k, t_{k+1}], so the step must be short compared with the period of vibration.
 """
 
 from __future__ import annotations

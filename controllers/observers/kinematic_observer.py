@@ -1,12 +1,12 @@
 """Displacements and velocities at many places of rigid parts from few displacement sensors.
 
-The observer knows where the sensors are, and nothing about the structure. An alpha-beta
-filter for each sensor estimates its displacement x and velocity v,
+The observer needs the places of the sensors and no model of the structure. An alpha-beta filter
+for each sensor estimates its displacement x and velocity v,
 
     e_k = y_k - (x_{k-1} + h v_{k-1})                                       (1)
     x_k = x_{k-1} + h v_{k-1} + alpha e_k,   v_k = v_{k-1} + beta/h e_k     (2)
 
-and T carries the motion of the sensors to that of the places,
+and T maps the motion of the sensors to that of the places,
 
     x_out = T x,  v_out = T v                                               (3)
 
@@ -59,6 +59,6 @@ class KinematicObserver(Block):
         if missed > 1e-3 * np.abs(places).max():
             raise ValueError(
                 f"KinematicObserver: the sensors miss {missed:.2g} of the motion of the places; add a sensor "
-                "on the part that they do not see"
+                "on the part whose motion they do not measure"
             )
         return cls(T=T, alpha=alpha, beta=alpha**2 / (2.0 - alpha))

@@ -5,16 +5,16 @@
     Q_0 = E S_ww E',  S_0 = E S_ww F',  R_0 = S_vv + F S_ww F'              (2.7)
     e' = (A - L C) e + E w - L (F w + v)                                    (2.8)
 
-P_0 solves the Riccati equation of the filter with the cross term S_0: the disturbance that
-moves the structure is in the measured accelerations too.
+P_0 solves the Riccati equation of the filter with the cross term S_0, since the measured
+accelerations contain the disturbance.
 
 Which sample: y_k is measured at t_k and carries the force held over [t_{k-1}, t_k]. The
 block takes that force as `u_last` and closes the step that ends at t_k,
 
     x_hat_k = A_d x_hat_{k-1} + B_d u_{k-1} + L_d y_k                       (1)
 
-which is the exact solution of (2.5) for u and y constant over the step. With the force of
-the next step instead, D u does not cancel and the estimate is wrong from the first step on.
+the exact solution of (2.5) for u and y constant over the step. With the force of the next
+step instead, D u does not cancel and every estimate is wrong.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def observer_gain(model: DesignModel, S_ww: Array, S_vv: Array) -> Array:
     R_0 = S_vv + model.F @ S_ww @ model.F.T
     _, gain = regulator(
         model.A.T, model.C.T, Q_0, 0.5 * (R_0 + R_0.T), S_0,
-        what="observer", names="sensor", remedy="no sensor sees it: move or add a sensor",
+        what="observer", names="sensor", remedy="no sensor measures it: move or add a sensor",
     )  # fmt: skip
     return np.asarray(gain.T)
 

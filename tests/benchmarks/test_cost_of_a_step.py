@@ -1,4 +1,4 @@
-"""What a communication step costs, by the kind of participant: a plant in feedback with a gain.
+"""The cost of a communication step by kind of participant: a plant in feedback with a gain.
 
     plain      the plant as an FMU of FMI 2.0, Co-Simulation, and a compiled block
     callback   the block in Python
@@ -6,7 +6,7 @@
     isolated   the plant as an FMU in a process of its own: set inputs, doStep, get outputs
 
 The table has microseconds, and ratios to the plain FMU; FMPy's own calls are timed in the same run.
-Under `long` there are a million steps. Isolation costs the change between two processes: 0.2 to 1
+Under `long` it takes a million steps. Isolation costs a switch between two processes, 0.2 to 1
 times FMPy's calls, depending on how busy the cores are.
 """
 
@@ -18,10 +18,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
 
 from cosim import FMU, Block, Input, LinearContinuous, Output, State, System, simulate
 from fmus.export import export
+from tests.benchmarks.fmpy_calls import free, initialised
 
 pytestmark = pytest.mark.benchmark
 
@@ -64,7 +64,7 @@ def files(tmp_path_factory):
 
 
 def run(plant: FMU, gain: type[Block], steps: int) -> tuple[float, np.ndarray]:
-    """Return microseconds a step, and where the masses come to."""
+    """Return microseconds per step, and the final displacements."""
     system = System({"plant": plant, "gain": gain()}, [("plant.v", "gain.v"), ("gain.u", "plant.u")])
     simulate(system, step=H, stop=10 * H)  # compiles
     result = simulate(system, step=H, stop=steps * H, record=["plant.x"], decimation=steps)
@@ -72,17 +72,8 @@ def run(plant: FMU, gain: type[Block], steps: int) -> tuple[float, np.ndarray]:
 
 
 def fmpy_calls(plant: FMU, steps: int) -> float:
-    """Return microseconds a step of FMPy's own calls, without a block."""
-    api = FMU2Slave(
-        guid=plant.description.guid,
-        unzipDirectory=str(plant.directory),
-        modelIdentifier=plant.description.coSimulation.modelIdentifier,
-        instanceName="plant",
-    )
-    api.instantiate()
-    api.setupExperiment(startTime=0.0)
-    api.enterInitializationMode()
-    api.exitInitializationMode()
+    """Return microseconds per step of FMPy's own calls, without a block."""
+    api = initialised(plant)
     read = [v.valueReference for v in plant.output_ports["v"].variables]
     write = [v.valueReference for v in plant.input_ports["u"].variables]
     began = time.perf_counter()
@@ -91,8 +82,7 @@ def fmpy_calls(plant: FMU, steps: int) -> float:
         api.setReal(write, [-0.1 * x for x in v])
         api.doStep(currentCommunicationPoint=k * H, communicationStepSize=H)
     took = time.perf_counter() - began
-    api.terminate()
-    api.freeInstance()
+    free(api)
     return 1e6 * took / steps
 
 
@@ -112,5 +102,5 @@ def test_cost_of_a_step(files, steps):
     print(f"\n{steps:,} steps; FMPy's own calls {by_hand:.1f} us a step")
     for name, cost in costs.items():
         print(f"{name:16}{cost:8.2f} us a step, {cost / costs['plain']:6.1f} of plain")
-    for name, end in ends.items():
-        assert np.array_equal(end, ends["plain"]), name
+    for name, final in ends.items():
+        assert np.array_equal(final, ends["plain"]), name

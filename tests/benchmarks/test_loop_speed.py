@@ -1,7 +1,7 @@
 """Speed of the loop: four small participants, a million steps, three recorded numbers.
 
 The reference is a C program written for this one system, compiled by the same clang and run
-right before: the ratio is what the generic loop costs. Nothing is asserted on seconds.
+right before, so the ratio is the cost of the generic loop. Nothing is asserted about seconds.
 """
 
 from __future__ import annotations

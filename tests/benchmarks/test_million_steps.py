@@ -1,10 +1,10 @@
 """A million communication steps: plant FMU, sensor, controller, filter, three recorded signals.
 
-Compared in the same run, as ratios of steps a second, with
+Compared in the same run, as ratios of steps per second, with
 
     (a) the same loop written in C for this one system, around the same plant FMU
     (b) FMPy's own calls in Python, with the same blocks
-    (c) ecos, with the blocks as the FMUs that they leave as
+    (c) ecos, with the blocks exported as FMUs
 """
 
 import math
@@ -16,7 +16,6 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from fmpy.fmi2 import FMU2Slave
 
 from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.phase_plane_surface import PhasePlaneSurface
@@ -25,6 +24,7 @@ from cosim.blocks import LowPass, SensorDynamics
 from fmus.export import as_fmu
 from fmus.packaging.other_tools import ecospy
 from fmus.plants.oscillator import Oscillator
+from tests.benchmarks.fmpy_calls import free, initialised
 from tests.others import tool
 
 pytestmark = pytest.mark.benchmark
@@ -85,16 +85,7 @@ def test_against_a_loop_in_c(plant, ours, tmp_path):
 
 def test_against_fmpy_calls(plant, ours):
     n = 20_000
-    api = FMU2Slave(
-        guid=plant.description.guid,
-        unzipDirectory=str(plant.directory),
-        modelIdentifier=plant.description.coSimulation.modelIdentifier,
-        instanceName="plant",
-    )
-    api.instantiate()
-    api.setupExperiment(startTime=0.0)
-    api.enterInitializationMode()
-    api.exitInitializationMode()
+    api = initialised(plant)
     reference = {v.name: v.valueReference for v in plant.description.modelVariables}
     read, write = [reference["x"], reference["v"]], [reference["u"]]
     y = z = filtered = last = 0.0
@@ -119,8 +110,7 @@ def test_against_fmpy_calls(plant, ours):
         y, z = s + decay * ((1 + r) * e + H * z), decay * ((1 - r) * z - r * e / mu)
         filtered += approach * (u - filtered)
     seconds = (time.perf_counter() - began) / n * N
-    api.terminate()
-    api.freeInstance()
+    free(api)
     ratio = seconds / ours.seconds
     print(f"\nFMPy's calls {N / seconds / 1e6:.4f} million steps/s: ours is {ratio:.0f} times as fast")
     assert rows[1000] == (ours["plant.x"][1000], ours["control.u"][1000], ours["control.M"][1000])
@@ -150,7 +140,7 @@ def test_against_ecos(plant, ours, tmp_path):
         simulation.step(n)
         seconds = (time.perf_counter() - began) / n * N
         x = simulation.get_real("plant::x")
-    # ecos exchanges all values before it steps all FMUs: what leaves a block arrives a step later
+    # ecos exchanges all values before it steps all FMUs: an output of a block arrives a step later
     system = System({"plant": plant, **blocks()})
     for source, target in CONNECTIONS:
         block = isinstance(system.participants[source.partition(".")[0]], Block)

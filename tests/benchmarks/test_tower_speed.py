@@ -11,11 +11,9 @@ import sys
 import time
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 import scipy.linalg as la
-from fmpy.fmi2 import FMU2Slave
 
 from controllers.design.design_model import first_order
 from controllers.laws.sliding_mode import SlidingMode
@@ -25,6 +23,7 @@ from scenarios.tall_building.building import with_damper
 from scenarios.tall_building.control import PERIOD, SURFACE_WEIGHTS, tower_observer
 from scenarios.tall_building.criteria import FLOORS
 from scenarios.tall_building.study import Study
+from tests.benchmarks.fmpy_calls import free, initialised
 
 pytestmark = pytest.mark.benchmark
 
@@ -47,21 +46,11 @@ def by_hand() -> tuple[float, np.ndarray]:
     steps = round(SPAN / H)
     plant = Study().build().participants["tower"]
     assert isinstance(plant, FMU)
-    description = fmpy.read_model_description(plant.path)
-    references = {v.name: v.valueReference for v in description.modelVariables}
+    references = {v.name: v.valueReference for v in plant.description.modelVariables}
     inputs = [references[f"w[{i + 1}]"] for i in range(76)] + [references["u"]]
     outputs = [references[f"{n}[{i + 1}]"] for n in "xva" for i in range(len(FLOORS))]
     outputs += [references[n] for n in ("x_m", "v_m", "a_m")]
-    fmu = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=str(plant.directory),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="tower",
-    )
-    fmu.instantiate()
-    fmu.setupExperiment(startTime=0.0)
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
+    fmu = initialised(plant)
 
     model = tower.model_of(None)
     observer = tower_observer(model)
@@ -91,8 +80,7 @@ def by_hand() -> tuple[float, np.ndarray]:
         fmu.setReal(inputs, force)
         fmu.doStep(k * H, H)
     seconds = time.perf_counter() - began
-    fmu.terminate()
-    fmu.freeInstance()
+    free(fmu)
     return seconds / steps * 1e6, peak[: len(FLOORS)]
 
 
@@ -125,9 +113,9 @@ def test_speed_of_the_whole_loop() -> None:
 
 
 def test_memory_of_a_default_run() -> None:
-    """900 s, default recording, a process of its own: below 500 MB with imports.
+    """900 s with default recording, in a separate process: below 500 MB with imports.
 
-    A process before it has compiled what is needed: Numba's compiler takes 250 MB, once.
+    A process before has compiled the kernels: Numba's compiler takes 250 MB, once.
     """
     # VmHWM and not ru_maxrss, which starts from the size of the process that started this one
     code = (

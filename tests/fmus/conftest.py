@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
-import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from fmus.export import export
-from tests.fmus.export.host import PARTICIPANTS, Host
+from tests.fmus.export.host import PARTICIPANTS, Host, library
 
 
 @pytest.fixture(scope="session")
@@ -35,10 +33,7 @@ def host_of(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[[s
 
     def give(name: str) -> Host:
         path = fmu_of(name)
-        with zipfile.ZipFile(path) as archive:
-            library = next(n for n in archive.namelist() if n.startswith("binaries/"))
-            place = archive.extract(library, tmp_path / str(len(hosts)))
-        hosts.append(Host(path, ctypes.CDLL(place)))
+        hosts.append(Host(path, library(path, tmp_path / str(len(hosts)))))
         return hosts[-1]
 
     yield give

@@ -1,4 +1,4 @@
-"""The code blocks of fmus/README.md run as they stand there."""
+"""The code blocks of fmus/README.md run unchanged."""
 
 from __future__ import annotations
 

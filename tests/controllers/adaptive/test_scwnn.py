@@ -1,4 +1,4 @@
-"""The wavelet network: its equations one by one, what it learns, and that it stays bounded."""
+"""The wavelet network: its equations one by one, its learning, and its bounds."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_seven_triangles_sum_to_an_interpolation():
 
 
 def test_memory_is_fixed_and_says_when_it_is_full():
-    """Inputs that never come back want a node each; three fit, the rest is counted."""
+    """Inputs that never repeat need a node each; three fit, the others are counted."""
     net = SCWNN.design(1, 3, E3=0.0)
     for k in range(30):
         net.x[0], net.v[0] = 1.0 + k, -k
@@ -106,7 +106,7 @@ class Oscillators(Continuous):
     u = Input("control", shape=2, unit="N")
     x = State((0.5, -0.3), "displacements", shape=2, unit="m")
     v = State(0.0, "velocities", shape=2, unit="m/s")
-    f = Output("what the network is to find", shape=2)
+    f = Output("function that the network must learn", shape=2)
 
     def derivatives(self, t: float) -> None:
         a, b = self.x[0], self.x[1]
@@ -157,7 +157,7 @@ def test_network_learns_a_nonlinear_system_while_it_controls_it():
 
 def test_compensated_network_stays_bounded_and_its_surface_is_kept():
     """With (3.60), the mean of 1/2 s^2 over 10 s does not grow from window to window by more than 5 %
-    (what is left is the harmonic load's), and r and f stay bounded for 100 s."""
+    (the rest is the response to the harmonic load), and r and f stay bounded for 100 s."""
     result = controlled(eta_r=1.0, eta_iw=50.0, eta_ib=50.0)
     V = 0.5 * (result["net.s"][:20000] ** 2).sum(axis=1).reshape(10, 2000).mean(axis=1)
     assert (V[1:] < 1.05 * V[:-1]).all(), V

@@ -1,5 +1,7 @@
 """Reduction, Riccati designs, observer, surfaces: against closed forms, `control`, their conditions."""
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import scipy.linalg as la
 from controllers.design.design_model import DesignModel, first_order
 from controllers.design.reduction import dominant_modes, static_condensation
 from controllers.design.riccati import DesignError, regulator
-from controllers.design.surface_design import optimal_surface
+from controllers.design.surface_design import optimal_surface, require_regular
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
 from controllers.laws.equivalent_force import design as equivalent_force
 from controllers.laws.sliding_mode import SlidingMode
@@ -247,24 +249,14 @@ def test_failing_conditions_name_the_culprit() -> None:
     with pytest.raises(DesignError, match="singular"):
         static_condensation(M, free, [2, 3])
     model = reduced()
-    blind = DesignModel(
-        np.diag([0.1, -1.0]),
-        np.ones((2, 1)),
-        np.eye(2),
-        np.array([[0.0, 1.0]]),
-        np.zeros((1, 1)),
-        np.zeros((1, 2)),
-    )
+    C, D, F = np.array([[0.0, 1.0]]), np.zeros((1, 1)), np.zeros((1, 2))
+    blind = DesignModel(np.diag([0.1, -1.0]), np.ones((2, 1)), np.eye(2), C, D, F)
     with pytest.raises(DesignError, match=r"observer: not stabilisable, mode 0\.1.*sensor"):
         observer_gain(blind, np.eye(2), np.eye(1))
     with pytest.raises(DesignError, match=r"take one"):
-        equivalent_force(
-            DesignModel(model.A, np.hstack([model.B, model.B]), model.E, model.C, model.D, model.F), np.eye(6)
-        )
+        equivalent_force(replace(model, B=np.hstack([model.B, model.B])), np.eye(6))
 
 
 def test_singular_PB_is_refused() -> None:
-    from controllers.design.surface_design import require_regular
-
     with pytest.raises(DesignError, match=r"P B is singular.*actuator\s+2"):
         require_regular(np.array([[1.0, 0.0], [2.0, 0.0]]), "law")

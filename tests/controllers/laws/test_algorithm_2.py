@@ -16,7 +16,7 @@ H = 0.01
         # alpha h = 0.1, beta h = 3: at the upper limit a switch costs 2.9, not 3
         (300.0, [1, -1, -1, 1], [300.0, 297.1, 297.2, 294.3]),
         (1.0, [1, -1, -1], [1.1, 1.0, 1.1]),  # and at the lower limit nothing
-        (150.0, [1, 0, -1], [150.1, 150.2, 147.3]),  # 0 is no switch, and the last sign is kept
+        (150.0, [1, 0, -1], [150.1, 150.2, 147.3]),  # 0 is not a switch, and the last sign is kept
     ],
 )
 def test_gain_by_hand(start: float, signs: list[int], gains: list[float]) -> None:

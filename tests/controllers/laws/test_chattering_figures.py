@@ -24,7 +24,7 @@ class Oscillator(LinearContinuous):
     c = Parameter(0.001, unit="N*s/m")
     k = Parameter(0.01, unit="N/m")
     u = Input(unit="N")
-    d = Input(unit="m/s2")
+    d = Input(unit="m/s^2")
     x1 = State(14.0, unit="m")
     x2 = State(25.0, unit="m/s")
 
@@ -72,7 +72,7 @@ def test_cases_1_and_2(law, sensor, coupling, norm, mean):
 
 
 def five():
-    return function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s2")
+    return function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s^2")
 
 
 @pytest.mark.parametrize("disturbance", [five, lambda: RecordSource(el_centro())])
@@ -90,12 +90,12 @@ def test_case_5(coupling, norm):
     ("coupling", "low", "high"), [("continuous", 904.5, 906.5), ("sampled", 1040.0, 1041.5)]
 )
 def test_case_4(coupling, low, high):
-    """The band is what differs between processings of the record; 905 is printed."""
+    """The band covers different processings of the ground motion; 905 is printed."""
     assert low < run(AlgorithmII(), coupling, RecordSource(el_centro()))[0] < high
 
 
 def test_case_3_is_not_the_print():
-    """153 is printed; about 906 is what the equations give with any seed (facts: not reproduced)."""
+    """153 is printed; the equations give about 906 with any seed, so the print is not reproduced."""
     for seed in (1, 2, 3):
-        noise = WhiteNoise(sample_period=0.01, seed=seed, unit="m/s2")
+        noise = WhiteNoise(sample_period=0.01, seed=seed, unit="m/s^2")
         assert 900.0 < run(AlgorithmII(), "continuous", noise)[0] < 912.0

@@ -103,8 +103,8 @@ def test_algorithm_2(values):
     assert np.allclose(trace(law, s[:, None], h, "M")[:, 0], expected, rtol=1e-14)
 
 
-def test_start_and_zero_are_no_switches():
-    """0 to 1 is the start; 1, 0, 1 is none; 1, 0, -1 is one, at the -1."""
+def test_start_and_zero_are_not_switches():
+    """0 to 1 is the start; 1, 0, 1 has no switch; 1, 0, -1 has one, at the -1."""
     s = np.array([0.0, 1.0, 0.0, 1.0, 0.0, -1.0, -1.0])
     M = trace(AlgorithmI(rate=2.0), s[:, None], 0.01, "M")[:, 0]
     assert M.tolist() == [100, 100, 100, 100, 100, 50, 50]

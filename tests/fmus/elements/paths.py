@@ -9,7 +9,7 @@ from fmus.elements.element import OWN, Element
 
 
 def memory(element: Element, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parameters and two memories of as many rows; the element's parameters stand in the last one."""
+    """Return parameters and two memories with `rows` rows; the last row is the element's."""
     p = np.zeros((rows, len(element.parameters)))
     p[-1] = element.parameters
     z = np.zeros((2, rows, OWN + element.memory))

@@ -38,12 +38,10 @@ def test_segment_in_uniform_bending_is_bilinear_in_moment_and_curvature():
     top = M_y * (1.0 + 3.0 * r)
     assert moments[0] == pytest.approx([top, -top], rel=1e-12)
     # back by 4 theta_y: elastic over 2 theta_y, then yielding the other way
-    assert moments[1] == pytest.approx(
-        [top - 2 * M_y - 2 * r * M_y] * 1 + [-(top - 2 * M_y - 2 * r * M_y)], rel=1e-12
-    )
-    assert z[1, PLASTIC] == pytest.approx(
-        (1 / r - 1) / 2.1e4 * (3 * r - 2 * r) * M_y, rel=1e-9
-    )  # plastic curvature
+    back = top - 2.0 * M_y - 2.0 * r * M_y
+    assert moments[1] == pytest.approx([back, -back], rel=1e-12)
+    curvature = (1.0 / r - 1.0) / 2.1e4 * (3.0 * r - 2.0 * r) * M_y  # (3): its plastic part
+    assert z[1, PLASTIC] == pytest.approx(curvature, rel=1e-9)
 
 
 def test_segment_does_not_depend_on_how_a_straight_path_is_cut():

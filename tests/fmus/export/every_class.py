@@ -1,9 +1,9 @@
-"""How to make one small instance, at least, of every Block and Continuous of ours.
+"""At least one small instance of every Block and Continuous of the packages.
 
-The packages are walked. What can be made without arguments needs no entry in `MAKE`; for any other
-class `test_every_class.py` fails until it has one. A class made from a template (`function_source`)
-stands here under the template's name. Where compiling takes seconds, sizes are those of other
-tests, so that a session compiles once.
+A class that needs no arguments needs no entry in `MAKE`; for any other class `test_every_class.py`
+fails until it has one. A class made from a template (`function_source`) is listed under the
+template's name. Where compilation takes seconds, sizes are those of other tests, so that a session
+compiles once.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ PACKAGES = ("controllers", "cosim.blocks", "fmus", "scenarios")
 
 
 def classes() -> dict[str, type[Participant]]:
-    """Every participant class that a module of ours defines, by module and name."""
+    """Return every participant class of the packages, by module and name."""
     found: dict[str, type[Participant]] = {}
     for package in PACKAGES:
         top = importlib.import_module(package)
@@ -90,7 +90,7 @@ def _random(*shape: int) -> np.ndarray:
     return np.random.default_rng(11).normal(size=shape)
 
 
-#: classes that need arguments, or show more with some; several where constructors differ in what they compute
+#: makers of classes that need arguments, or do more with some; several where the computation differs
 MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
     # control laws of chapter 2, their filter, observer and estimator
     SlidingMode: [lambda: SlidingMode.design(model(), np.eye(4))],
@@ -143,7 +143,7 @@ MAKE: dict[type[Participant], list[Callable[[], Participant]]] = {
 
 
 def makers(kind: type[Participant]) -> list[Callable[[], Participant]]:
-    """How to make instances of a class."""
+    """Return functions that make instances of a class."""
     return MAKE.get(kind, [kind])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -109,6 +110,13 @@ def convert(x: Any) -> Any:
     if isinstance(x, np.uint64):
         return ctypes.c_size_t(int(x))
     return ctypes.c_double(x) if isinstance(x, float) else x
+
+
+def library(fmu: Path, folder: Path) -> ctypes.CDLL:
+    """Unpack an FMU's library into a folder and load it."""
+    with zipfile.ZipFile(fmu) as archive:
+        name = next(n for n in archive.namelist() if n.startswith("binaries/"))
+        return ctypes.CDLL(archive.extract(name, folder))
 
 
 class Accumulator(Block):

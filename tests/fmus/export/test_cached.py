@@ -1,4 +1,4 @@
-"""The cache of exported FMUs: what makes another file, and what does not."""
+"""The cache of exported FMUs: changes that make another file, and changes that do not."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_what_the_fmu_contains_makes_another_one() -> None:
 
 
 def test_units_in_the_file_are_those_of_the_declaration() -> None:
-    """A changed unit alone once left the old file in the cache."""
+    """A change of the unit alone once returned the old file."""
     for unit in ("m", "mm"):
         fmu = as_fmu(gain(('unit="m"', f'unit="{unit}"')))
         assert fmu.input_ports["x"].unit == unit

@@ -1,4 +1,4 @@
-"""Controllers and plants of ours, all as FMUs, close the loop in ecos (C++) and in a loop of FMPy's calls.
+"""Controllers and plants, all as FMUs, close the loop in ecos (C++) and in a loop of FMPy's calls.
 
 Two schedules, and they differ by far more than any tolerance here:
 
@@ -52,7 +52,7 @@ from tests.others import tool
 
 @dataclass
 class Loop:
-    """Participants, connections, and what is compared."""
+    """Participants, connections, and the ports to compare."""
 
     members: Callable[[], dict[str, Participant]]
     connections: list[tuple[str, str]]
@@ -112,7 +112,7 @@ def network() -> Loop:
 
 
 def boundary_layer() -> Loop:
-    """Chapter 4 with scalar ports only, which is what ecos takes of FMI 3.0."""
+    """Chapter 4 with scalar ports only, the ports of FMI 3.0 that ecos supports."""
     return Loop(
         lambda: {
             "plant": Oscillator(),
@@ -157,7 +157,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], t
 
 
 def system_of(loop: Loop, paths: dict[str, Path], as_block: bool) -> System:
-    """The loop with FMUs only; as blocks those that were blocks."""
+    """Return the loop with FMUs only; FMUs of blocks act as blocks."""
     blocks = {n for n, m in loop.members().items() if isinstance(m, Block)} if as_block else set()
     system = System({n: FMU(p, as_block=n in blocks) for n, p in paths.items()}, loop.connections)
     for source, target in loop.delayed:
@@ -171,7 +171,7 @@ def ours(loop: Loop, system: System) -> dict[str, Array]:
 
 
 def elements(port: Port) -> list[str]:
-    """Names of a port's elements as FMI 2.0 has them."""
+    """Return the names of a port's elements in FMI 2.0."""
     if not port.shape:
         return [port.name]
     return [f"{port.name}[{i + 1}]" for i in range(port.first, port.first + port.count)]
@@ -187,7 +187,7 @@ def same_bits(found: dict[str, Array], expected: dict[str, Array]) -> None:
 
 
 def in_ecos(loop: Loop, system: System, paths: dict[str, Path]) -> dict[str, Array]:
-    """Values after each step: ecos has got the next inputs then, so outputs with feedthrough are no use."""
+    """Return values after each step, when ecos has set the next inputs: not for outputs with feedthrough."""
     ecos = tool(ecospy)
     structure = ecos.EcosSimulationStructure()
     for name, path in paths.items():
@@ -212,7 +212,7 @@ def in_ecos(loop: Loop, system: System, paths: dict[str, Path]) -> dict[str, Arr
 
 @pytest.mark.parametrize(("name", "version"), [*((n, "2.0") for n in LOOPS), ("boundary layer", "3.0")])
 def test_ecos_closes_the_loop(exported: Any, name: str, version: str) -> None:
-    """FMI 2.0 all of them; FMI 3.0 where all ports are scalars, for ecos has no arrays."""
+    """All loops in FMI 2.0; in FMI 3.0 those with scalar ports, since ecos has no arrays."""
     loop, paths = exported(name, version)
     system = system_of(loop, paths, as_block=False)
     expected = {port: values[1:] for port, values in ours(loop, system).items()}
@@ -223,7 +223,7 @@ def test_ecos_closes_the_loop(exported: Any, name: str, version: str) -> None:
 
 
 class Slave:
-    """An FMU by FMPy's own calls: ports of floats by name, of either version of FMI."""
+    """An FMU through FMPy's own calls: ports of floats by name, in either version of FMI."""
 
     def __init__(self, path: Path, folder: Path, name: str) -> None:
         description = fmpy.read_model_description(str(path))

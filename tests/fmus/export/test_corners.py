@@ -1,4 +1,4 @@
-"""Participants at the edge (nothing in, nothing kept, no limit), and FMUs of ours in our own loop."""
+"""Participants without inputs, states or limits, and exported FMUs in the project's own loop."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Limiter(Continuous):
 
 
 class Sink(Block):
-    """Counts what is positive: no output"""
+    """The number of positive inputs, as a state: no output"""
 
     u = Input(unit="N")
     n = State(0.0, "count", unit="1")
@@ -57,7 +57,7 @@ class Sink(Block):
 
 
 class Delicate(Continuous):
-    """x' = sqrt(u - 0.5): not a number when u swings below 0.5"""
+    """x' = sqrt(u - 0.5), NaN when u swings below 0.5"""
 
     u = Input(unit="1", start=1.0)
     x = State(unit="1")
@@ -142,7 +142,7 @@ def test_matrices_of_an_earlier_advance_stay_behind(tmp_path: Path) -> None:
 
 
 def test_the_step_of_a_host_that_rounds_is_one_step(host_of: Callable[[str], Host]) -> None:
-    """Differences of times differ in their last digits; what belongs to a step is not computed anew."""
+    """Equal steps differ in their last digits as differences of times; matrices are not computed again."""
     h = host_of("building")
     states = []
     for start in (0.0, 1000.0):
@@ -172,7 +172,7 @@ class Drive(Block):
 
 
 def test_interpreted_compiled_and_as_fmu_it_is_the_same_plant(fmu_of: Callable[..., Path]) -> None:
-    """Over 10,000 steps in our own loop; rounding of 1e-16 a step adds up to less than 1e-12."""
+    """Over 10,000 steps in the loop; rounding of 1e-16 per step adds up to less than 1e-12."""
     found = []
     for plant, jit in ((Oscillator(), False), (Oscillator(), True), (FMU(fmu_of("oscillator")), True)):
         system = System({"drive": Drive(), "plant": plant}, [("drive.u", "plant.u"), ("drive.d", "plant.d")])

@@ -1,4 +1,4 @@
-"""Any block and plant of ours leaves: both versions of FMI, no finding, the same trajectory in our own loop.
+"""Every block and plant as an FMU: both versions of FMI, no finding, the same trajectory in the loop.
 
 Every class in the packages is walked (every_class.py). Participant and FMU stand side by side in one
 system, driven by the same noise; a block's FMU acts as a block, a plant's runs as Co-Simulation and,
@@ -32,7 +32,7 @@ from tests.fmus.export.every_class import MAKE, H, classes, makers, whole_bridge
 STEPS = 120
 KINDS = classes()
 PAIRS = [(kind, i) for kind in KINDS.values() for i in range(len(makers(kind)))]
-#: FMI 2.0 and 3.0 in turn, for linking takes half a second; the other one too under `long`
+#: FMI 2.0 and 3.0 in turn, since linking takes half a second; `long` runs the other version too
 CASES = [
     pytest.param(
         *pair,
@@ -100,7 +100,7 @@ def side_by_side(
 def check_leaves(
     ours: Participant, version: str, folder: Path, says: Callable[[Path], str], h: float = H
 ) -> dict[str, np.ndarray]:
-    """Export, have it checked, and compare; return the signals."""
+    """Export, check and compare a participant; return the signals."""
     path = export(ours, folder / "it.fmu", fmi_version=version)
     assert validate_fmu(str(path)) == []
     said = says(path)
@@ -130,7 +130,7 @@ def test_a_class_leaves(
 
 @pytest.mark.parametrize("kind", [k for n, k in KINDS.items() if n.startswith("controllers.")])
 def test_a_controller_interpreted_is_compiled(kind: type[Participant]) -> None:
-    """So what leaves is what the debugger shows; the blocks of cosim.blocks have their own test of this.
+    """So the FMU computes what the debugger shows; cosim.blocks has its own test of this.
 
     On many seeds: a power that one of the two multiplies out differs in one of three.
     """

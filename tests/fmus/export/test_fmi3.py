@@ -1,7 +1,7 @@
 """FMI 3.0: arrays as arrays, and the same answers to misuse as in FMI 2.0.
 
-What both versions share (evaluation, states, derivatives) is one core, tested through FMI 2.0;
-here is what the front end of FMI 3.0 adds.
+Both versions share one core (evaluation, states, derivatives), which is tested through FMI 2.0;
+these are the tests of the front end of FMI 3.0.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fmpy import read_model_description, simulate_fmu
 
 from cosim import Array, Continuous, Input, Output, State
 from fmus.export import export
-from tests.fmus.export.host import ERROR, OK, Accumulator, building, convert
+from tests.fmus.export.host import ERROR, OK, Accumulator, building, convert, library
 from tests.fmus.export.linear import EXACT, linear_building, linear_oscillator, relative
 
 LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
@@ -103,10 +103,7 @@ def host3(fmu_of: Callable[..., Path], tmp_path: Path) -> Iterator[Callable[[str
 
     def give(name: str) -> Host3:
         path = fmu_of(name, "3.0")
-        with zipfile.ZipFile(path) as archive:
-            library = next(n for n in archive.namelist() if n.startswith("binaries/"))
-            place = archive.extract(library, tmp_path / str(len(hosts)))
-        hosts.append(Host3(path, ctypes.CDLL(place)))
+        hosts.append(Host3(path, library(path, tmp_path / str(len(hosts)))))
         return hosts[-1]
 
     yield give
@@ -301,7 +298,7 @@ def test_model_exchange_in_fmpy(fmu_of: Callable[..., Path]) -> None:
 
 
 def test_co_simulation_in_fmpy_with_array_parameters(fmu_of: Callable[..., Path]) -> None:
-    """A building twice as heavy and as stiff moves the same under its ground."""
+    """A building that is twice as heavy and twice as stiff has the same response to the ground."""
     path = str(fmu_of("building", "3.0"))
     start = {"ground_acceleration": 1.0}
     options: dict[str, Any] = {

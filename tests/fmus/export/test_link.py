@@ -1,4 +1,4 @@
-"""Libraries for five platforms, what cannot be linked, the cache, and files that repeat."""
+"""Libraries for five platforms, failures of linking, the cache, and reproducible files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_linux(tmp_path: Path, architecture: str) -> None:
 
 
 def test_both_linux_architectures(tmp_path: Path) -> None:
-    """linux64 is x86_64, as FMI 2.0 means it; the other has the name that FMI 3.0 gives it."""
+    """linux64 is x86_64, as in FMI 2.0; the other platform has its name of FMI 3.0."""
     found = binaries(export(Oscillator(), tmp_path / "o.fmu", platforms=["aarch64-linux", "x86_64-linux"]))
     assert {n: elf(data)[1] for n, data in found.items()} == {
         "linux64/Oscillator.so": ELF_MACHINE["x86_64"],
@@ -138,7 +138,7 @@ def test_the_front_end_compiles_without_a_warning(tmp_path: Path, version: str) 
 
 
 def test_threads_may_write_one_archive(tmp_path: Path) -> None:
-    """Each writes a file of its own and renames it; whoever reads sees a whole archive."""
+    """Each writes its own file and renames it, so a reader sees a complete archive."""
     path, files = tmp_path / "one.fmu", {"modelDescription.xml": b"x" * 100_000}
     with ThreadPoolExecutor(8) as pool:
         for done in [pool.submit(write_archive, path, files) for _ in range(64)]:
@@ -149,7 +149,7 @@ def test_threads_may_write_one_archive(tmp_path: Path) -> None:
 
 
 class Gate(Block):
-    """Gives up when u is above 5"""
+    """Fails when u is above 5"""
 
     u = Input()
     y = Output()

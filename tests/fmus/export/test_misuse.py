@@ -1,4 +1,4 @@
-"""Every misuse of an exported FMI 2.0 FMU: status Error and one line in the log that says what, no crash.
+"""Every misuse of an exported FMI 2.0 FMU: status Error and one line in the log with the cause, no crash.
 
 A refused call changes nothing: after each the same instance still does its work.
 """
@@ -44,7 +44,7 @@ def terminated(h: Host) -> None:
 U, A, X, DER_X, M, LOCAL = 0, 2, 3, 5, "m", 9
 value = np.zeros(1)
 
-# (what, instance before, call, part of the log line)
+# (misuse, state of the instance, call, part of the log line)
 MISUSE: list[tuple[str, Callable[[Host], None], Callable[[Host], int], str]] = [
     (
         "enter initialization without experiment",
@@ -188,7 +188,7 @@ def test_misuse_is_an_error_with_a_reason_and_changes_nothing(
     assert call(h) == ERROR
     assert [(status, category) for status, category, _ in h.log] == [(ERROR, "logStatusError")]
     assert says in h.log[0][2]
-    # still as good as new: reset, run, and get the numbers of an untouched instance
+    # nothing has changed: after a reset, the run gives the numbers of an untouched instance
     assert h.call("Reset") == OK
     mode = MODEL_EXCHANGE if before is running_me else CO_SIMULATION
     h.prepare()

@@ -22,7 +22,7 @@ in_one_process = settings(
 
 
 def run(h: Host, t: float, path: list[tuple[float, float]]) -> tuple[float, list[list[float]]]:
-    """Drive a building; return the time that is reached and all outputs on the way."""
+    """Drive a building; return the final time and the outputs of all steps."""
     rows = []
     for ground, step in path:
         assert h.set(("ground_acceleration", ground)) == OK
@@ -80,7 +80,7 @@ def test_a_restored_state_continues_bit_for_bit(
 @in_one_process
 @given(data=st.data())
 def test_damaged_bytes_are_refused(host_of: Callable[[str], Host], data: st.DataObject) -> None:
-    """Any damaged byte: of the header, of the record with its indices and matrices, of the checksum.
+    """Any damaged byte: of the header, of the storage with its indices and matrices, of the checksum.
 
     The instance goes on from where it was, and other bytes of the same length are refused too.
     """
@@ -175,7 +175,7 @@ def test_reset_forgets_parameters_too(host_of: Callable[[str], Host]) -> None:
 
 
 def test_instances_do_not_know_of_each_other(host_of: Callable[[str], Host]) -> None:
-    """Two instances of one library in turns give what each gives alone."""
+    """Two instances of one library, stepped in turn, give the results of each alone."""
     alone = []
     paths = [[(g, 0.02)] * 20 for g in (1.0, -2.5)]
     h = host_of("building")
@@ -220,7 +220,7 @@ def test_cycles_do_not_grow(host_of: Callable[[str], Host], cycles: int) -> None
     in 1000, one lost state 8 MB. The bound of 2 MB is for what Python itself takes and keeps.
     """
     h = host_of("building")
-    cycle(h, 200)  # what is allocated once
+    cycle(h, 200)  # memory that is allocated once
     memory, handles = memory_and_handles()
     cycle(h, cycles)
     more, handles_after = memory_and_handles()

@@ -1,4 +1,4 @@
-"""Exported plants compute what they should, in FMPy, in ecospy and called directly.
+"""Exported plants compute the exact response, in FMPy, in ecospy and called directly.
 
 Linear plants against scipy.signal's exact discretisation, to 1e-12 of the largest value: both are
 exact but for rounding, which grows with the number of steps (here 1000, 1e-16 each).
@@ -137,7 +137,7 @@ def test_cvode_agrees_with_the_exact_solution(fmu_of: Callable[..., Path]) -> No
 
 @pytest.mark.parametrize("version", FMI_VERSIONS)
 def test_ecos_computes_the_same(fmu_of: Callable[..., Path], version: str) -> None:
-    """ecos steps by its own master: input set once, a hundred steps."""
+    """ecos is the master: the input is set once, then a hundred steps."""
     ecos = tool(ecospy)
     structure = ecos.EcosSimulationStructure()
     structure.add_model("plant", str(fmu_of("oscillator", version)))

@@ -1,4 +1,4 @@
-"""What is exported passes the checkers of others, and says what is so: structure, units, reference result."""
+"""Exported FMUs pass other projects' checkers; structure, units and reference result are right."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_parameters_count_when_initialisation_ends(fmu_of: Callable[..., Path]) 
 
 
 class Saturated(Continuous):
-    """Compares numbers: dependencies stay those of the source, a superset"""
+    """A comparison of numbers: the dependencies are those of the source, a superset"""
 
     u = Input(shape=2)
     x = State(shape=2)

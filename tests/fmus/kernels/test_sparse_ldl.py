@@ -53,7 +53,7 @@ def test_product_is_that_of_the_whole_matrix():
     assert y == pytest.approx(2.0 + (K @ x)[p.order], rel=1e-14)
 
 
-def test_a_matrix_that_is_not_positive_definite_is_told():
+def test_a_matrix_that_is_not_positive_definite_is_reported():
     K = grid_matrix(3, 4, seed=2)
     K[5, 5] = -1.0
     assert factored(K)[4] > 0

@@ -1,4 +1,4 @@
-"""The across-wind load: what it is declared to be, and the printed uncontrolled figures."""
+"""The across-wind load against its declared statistics, and the printed uncontrolled figures."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +19,7 @@ TRIBUTARY = 0.5 * (HEIGHTS + np.append(HEIGHTS[1:], 0.0))
 
 
 def test_same_seed_same_load_another_seed_another() -> None:
-    """Bit for bit: results are compared over machines by seed."""
+    """Bit for bit, since results of several machines are compared by seed."""
     a, b, other = (across_wind(STORY_HEIGHTS, 60.0, seed) for seed in (5, 5, 6))
     assert np.array_equal(a, b)
     assert a.shape == (601, 76)
@@ -102,13 +102,8 @@ def test_user_records(tmp_path: Path) -> None:
     time, force = np.arange(5) * 0.25, np.arange(15.0).reshape(5, 3) * 1e3
     np.savez(tmp_path / "w.npz", time=time, force=force)
     np.savetxt(tmp_path / "w.csv", np.column_stack([time, force]), delimiter=",")
-    np.savetxt(
-        tmp_path / "titled.csv",
-        np.column_stack([time, force]),
-        delimiter=",",
-        header="time,1,2,F",
-        comments="",
-    )
+    titles = {"header": "time,1,2,F", "comments": ""}
+    np.savetxt(tmp_path / "titled.csv", np.column_stack([time, force]), delimiter=",", **titles)
     for name in ("w.npz", "w.csv", "titled.csv"):
         got, dt = load_forces(tmp_path / name, 3)
         np.testing.assert_array_equal(got, force)

@@ -61,7 +61,7 @@ class Damper(Block):
 
 
 class Watch(Block):
-    """y = 2 p + q, for what is left over: scalars, a delayed input"""
+    """y = 2 p + q: scalars, and a delayed input"""
 
     p = Input("a force", unit="kN")
     q = Input("a displacement", unit="m", start=0.25)

@@ -1,4 +1,4 @@
-"""A system as one FMU: in our loop and in FMPy, the bits of the system itself.
+"""A system as one FMU gives the bits of the system itself, in the loop and in FMPy.
 
 The container gives outputs of plants at t_k as they are then, those of blocks as computed at
 t_{k-1}: compared with that shift, and nothing else.
@@ -24,7 +24,7 @@ H, STOP = 0.005, 1.0
 
 
 class Chain(Continuous):
-    """x' = u - x, y = x + u: two of them in a row differ if one gets what the other has at t_k+1"""
+    """x' = u - x, y = x + u: two in a row differ if one receives the other's output at t_k+1"""
 
     u = Input("input", unit="N", start=1.0)
     x = State(0.3, "state", unit="N")
@@ -38,7 +38,7 @@ class Chain(Continuous):
 
 
 def chain() -> System:
-    """Plant drives plant, with units on the way; the first one's input is free, the last one is blocked."""
+    """Plant drives plant, with units on the way; the first input is unconnected, the last plant braked."""
     system = System({"a": Chain(), "b": Chain(x=-0.2), "c": Chain(), "brake": Brake(), "mass": Oscillator()})
     system.connect("a.y", "b.u")
     system.connect("b.x", "c.u")
@@ -75,7 +75,7 @@ def case_6() -> System:
     ids=["at rest", "arrays 2.0", "arrays 3.0", "chain", "late", "chattering"],
 )
 def test_the_same_bits_as_the_system(tmp_path, build, version, step):
-    """Noise, switching control and feedthrough amplify what is off by a bit or by a step."""
+    """Noise, switching control and feedthrough amplify an error of a bit or of a step."""
     system = build()
     path = export_container(system, tmp_path / "whole.fmu", step=step, stop=STOP, fmi_version=version)
     assert validate_fmu(str(path)) == []
@@ -84,7 +84,7 @@ def test_the_same_bits_as_the_system(tmp_path, build, version, step):
     for name, signal in expected.signals.items():
         late = int(system.participants[name.partition(".")[0]].as_block)
         whole = found[f"it.{name}"]
-        # at t_0 the container has brought initial outputs to inputs, which we do when we step
+        # at t_0 the container has passed initial outputs to inputs; the loop does so when it steps
         first = 1 if build is chain else late
         assert np.array_equal(whole[first:], signal[first - late : len(signal) - late]), name
         assert expected.units[name] == found.units[f"it.{name}"]
@@ -92,7 +92,7 @@ def test_the_same_bits_as_the_system(tmp_path, build, version, step):
 
 
 def test_in_fmpy_with_larger_steps(tmp_path):
-    """The host steps four times as far; inside it is the same, so the numbers are."""
+    """The host's step is four times longer; the steps inside, and so the numbers, are the same."""
     path = export_container(frame(), tmp_path / "whole.fmu", step=H, stop=STOP)
     theirs = simulate_fmu(str(path), stop_time=STOP, output_interval=4 * H, output=["frame.x[1]"])
     ours = simulate(frame(), step=H, stop=STOP)["frame.x"][::4, 0]
@@ -100,7 +100,7 @@ def test_in_fmpy_with_larger_steps(tmp_path):
 
 
 def test_inputs_and_parameters_of_the_whole(tmp_path):
-    """What nothing feeds is an input, parameters are parameters; start values of FMUs are kept."""
+    """Unconnected inputs are inputs, parameters are parameters; start values of FMUs are kept."""
     oscillator = export(Oscillator(), tmp_path / "oscillator.fmu")
     system = System({"mass": FMU(oscillator, start={"m": 2.0, "x": 3.0}), "brake": Brake()})
     system.connect("mass.v", "brake.v")

@@ -1,4 +1,4 @@
-"""Tools of others are imported from their wheels alone, or are missed in one line with a remedy."""
+"""Other tools are imported from their wheels alone; an error in one line names a missing one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_tool_that_is_missing_is_named_with_its_remedy(
 
 
 def test_the_library_of_the_wheel_is_loaded_first_and_visible_to_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the machine has: the module is imported after the library, in this order."""
+    """On any machine: the library is loaded first, then the module is imported."""
     calls: list[object] = []
     monkeypatch.delitem(sys.modules, "ecospy", raising=False)
     monkeypatch.setattr(
@@ -56,7 +56,7 @@ def test_a_table_without_ecos_says_so(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the extra `test` has both tools on Linux only")
 def test_both_tools_live_in_one_process() -> None:
-    """In a process of its own, for OpenSees writes a line when its process ends."""
+    """In a separate process, since OpenSees writes a line when its process ends."""
     code = "from fmus.packaging.other_tools import *; print(ecospy().__name__, opensees().__name__)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout.split()[:2] == ["ecospy", "openseespy.opensees"], done.stderr

@@ -1,4 +1,4 @@
-"""Systems out as SSP and in again: valid by the schemas, the same bits, the same wiring."""
+"""Systems as SSP and back: valid by the schemas, the same bits, the same wiring."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_the_same_bits_after_the_way_through_a_file(tmp_path, version):
     assert np.ptp(result["watch.y"]) > 0.01
     assert (package.experiment.start, package.experiment.stop, package.experiment.step) == (0.0, STOP, H)
     assert package.system.participants["damper"].as_block
-    # and once more: FMUs are copied
+    # a second time: FMUs are copied
     again = export_ssp(package.system, tmp_path / "again.ssp", step=H, stop=STOP, version=version)
     validated(again)
     same_runs(system, read_ssp(again))
@@ -90,7 +90,7 @@ def test_version_1_unless_the_system_needs_2(tmp_path):
 
 
 def test_units_are_written_as_what_replaces_them(tmp_path):
-    """A tool that knows units must not convert twice, one that does not must convert once."""
+    """A tool that converts units must not convert twice; one that does not must convert once."""
     root = validated(export_ssp(loop(), tmp_path / "loop.ssp"))
     found = {
         (c.get("startConnector"), c.get("endConnector")): c
@@ -105,7 +105,7 @@ def test_units_are_written_as_what_replaces_them(tmp_path):
 
 
 def test_the_parameters_of_a_python_participant_are_in_its_set(tmp_path):
-    """They can be changed in the file, and count."""
+    """A change of them in the file takes effect."""
     path = export_ssp(System({"damper": Damper(g=33.0)}), tmp_path / "one.ssp")
     with zipfile.ZipFile(path) as archive:
         files = {n: archive.read(n) for n in archive.namelist()}
@@ -148,7 +148,7 @@ def test_the_same_system_gives_the_same_bytes(tmp_path):
 
 
 class Interpreted(Block):
-    """Python that is not compiled"""
+    """A block that runs as Python"""
 
     compiled = False
     y = Output()
@@ -167,7 +167,7 @@ def test_what_cannot_leave_is_an_error_that_names_it(tmp_path):
 
 
 class Mine(Block):
-    """The user's controller in place of the damper: other names for inside, the same ports, forces in kN"""
+    """The user's controller in place of the damper: other names inside, the same ports, forces in kN"""
 
     v = Input(unit="m/s", shape=2)
     a = Input(unit="m/s^2", shape=2)
@@ -199,7 +199,7 @@ def test_a_python_block_in_place_of_a_component(tmp_path):
 
 
 def links(system):
-    """Every element that is fed, by name: where from, with which factor, offset and start."""
+    """Return the source, factor, offset and start of every connected element, by name."""
     found = {}
     for c in system.connections:
         names = []
@@ -230,7 +230,7 @@ NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_wiring_comes_back(files, tmp_path, data):
-    """Participants, start values, rates, and what feeds every element of every input."""
+    """Participants, start values, rates, and the source of every element of every input."""
     version = data.draw(st.sampled_from(["2.0", "3.0"]))
     system = System()
     for i, kind in enumerate(
@@ -270,7 +270,7 @@ def test_any_wiring_comes_back(files, tmp_path, data):
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_other_text_is_read_or_refused(tmp_path, data):
-    """A changed SSD gives a system or an error of ours, never another one."""
+    """A changed SSD gives a system or a CosimError, never another error."""
     path = tmp_path / "good.ssp"
     if not path.exists():
         export_ssp(loop(), path)

@@ -1,8 +1,8 @@
-"""An SSP of ours in other tools: ecos (C++), libcosim (C++, FMI Library) and FMPy, to the last bit or 1e-12.
+"""Exported SSPs in other tools: ecos (C++), libcosim (C++, FMI Library) and FMPy, exact or to 1e-12.
 
-They are Jacobi masters: at a communication point all FMUs get what the others had then, and
-all are stepped, blocks as well. That is our own loop with every FMU as a plain one
-(`as_block=False`), and it is our sampled loop with every connection out of a block one step late.
+They are Jacobi masters: at a communication point all FMUs receive the present values of the others,
+and all are stepped, blocks included. This equals the loop with every FMU as a plant
+(`as_block=False`), and sampled coupling with every connection from a block one step late.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def column(result, port):
     ids=lambda x: x if isinstance(x, str) else x.__name__,
 )
 def test_the_same_numbers_elsewhere(tmp_path, tool, name):
-    """FMPy starts with zeros in all connectors and drops transformations: it gets the loop without."""
+    """FMPy starts with zeros in all connectors and ignores transformations, which this loop does not have."""
     build, ports = LOOPS[name]
     path = export_ssp(build(), tmp_path / "loop.ssp", step=H, stop=N * H)
     plain = read_ssp(path)
@@ -109,7 +109,7 @@ def test_fmus_of_version_3_in_ecos(tmp_path):
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_the_delay_that_a_jacobi_master_adds(tmp_path, name):
-    """One step for each block in the loop: our sampled loop with what leaves a block one step late."""
+    """One step for each block in the loop: sampled coupling with outputs of blocks one step late."""
     build, ports = LOOPS[name]
     system = build()
     late = System(dict(system.participants))
@@ -127,7 +127,7 @@ def test_the_delay_that_a_jacobi_master_adds(tmp_path, name):
 
 
 class Count(Block):
-    """n counts the calls"""
+    """n is the number of calls"""
 
     n = State(0.0)
 
@@ -136,7 +136,7 @@ class Count(Block):
 
 
 def test_a_sample_period_is_known_to_ecos(tmp_path):
-    """Our annotation keeps it for us, the Open Simulation Platform's for tools that read that."""
+    """In the project's annotation, and in the Open Simulation Platform's for tools that read it."""
     system = System({"slow": Count(sample_period=4 * H), "fast": Count()})
     path = export_ssp(system, tmp_path / "rates.ssp", step=H, stop=N * H)
     assert ecos(str(path), ["slow.n", "fast.n"])[-1].tolist() == [N / 4, N]

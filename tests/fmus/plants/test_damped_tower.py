@@ -32,14 +32,13 @@ def held_step(coupled: Structure, h: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize(
     "damper",
     [
-        Damper(),
-        Damper(c=2.0e4),
-        Damper(c=2.0e6),
-        Damper(m=5e6, c=1e3, k=5.05e6),
-        Damper(k=5e3),
-        Damper(k=5e8),
+        pytest.param(Damper(), id="benchmark"),
+        pytest.param(Damper(c=2.0e4), id="lightly damped"),
+        pytest.param(Damper(c=2.0e6), id="overdamped"),
+        pytest.param(Damper(m=5e6, c=1e3, k=5.05e6), id="heavy"),
+        pytest.param(Damper(k=5e3), id="soft"),
+        pytest.param(Damper(k=5e8), id="stiff"),
     ],
-    ids=["benchmark", "lightly damped", "overdamped", "heavy", "soft", "stiff"],
 )
 @pytest.mark.parametrize("stiffness", [1.0, 1.15, 0.85])
 def test_modes_are_complete(damper: Damper, stiffness: float) -> None:
@@ -49,16 +48,9 @@ def test_modes_are_complete(damper: Damper, stiffness: float) -> None:
     roots = np.zeros((2 * n + 2, 2))
     re, im = np.zeros((2, 2 * n + 2, n + 1))
     count = coupled_modes(
-        stiffness * modes.omega**2,
-        modes.damping,
-        modes.shapes[-1].copy(),
-        damper.m,
-        damper.c,
-        damper.k,
-        roots,
-        re,
-        im,
-    )
+        stiffness * modes.omega**2, modes.damping, modes.shapes[-1].copy(), damper.m, damper.c, damper.k,
+        roots, re, im,
+    )  # fmt: skip
     lam = roots[:count, 0] + 1j * roots[:count, 1]
     pairs = np.where(lam.imag > 0, 2.0, 1.0)
     assert pairs.sum() == 2 * (n + 1)

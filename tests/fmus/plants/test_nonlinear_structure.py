@@ -1,4 +1,4 @@
-"""The integrator of nonlinear structures: accuracy, order, energy, failure, a law of one's own."""
+"""The integrator of nonlinear structures: accuracy, order, energy, failure, a user's law."""
 
 from __future__ import annotations
 
@@ -113,12 +113,12 @@ def test_bilinear_oscillator_from_rest_at_constant_force():
 
 
 def cubic(e, d, d0, rate, h, p, z0, z):
-    """f = k d + k3 d^3, as a user writes a law of his own."""
+    """f = k d + k3 d^3, as a user writes it."""
     k, k3 = p[e, 0], p[e, 1]
     return k * d + k3 * d**3, k + 3.0 * k3 * d**2, 0.5 * k * d**2 + 0.25 * k3 * d**4, 0.0
 
 
-def test_a_law_of_ones_own():
+def test_a_users_law():
     """Duffing oscillator against an adaptive solver; h = 2 ms leaves (w h)^2/12 = 2e-4 in phase a radian."""
     structure = Structure([[2.0]], [[0.8]], [[300.0]], np.ones(1), displacements=np.ones(1))
     plant = NonlinearStructure.build(

@@ -1,4 +1,4 @@
-"""The tuned mass damper as a plant: its momentum is what the floor gets back."""
+"""The tuned mass damper as a plant: its reaction on the floor balances its momentum."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fmus.plants.tuned_mass_damper import TunedMassDamper
 
 
 def test_reaction_is_the_opposite_of_what_moves_the_mass() -> None:
-    """m y'' = -reaction at any state and input, for spring, dashpot and actuator stand on the floor."""
+    """m y'' = -reaction at any state and input, since spring, dashpot and actuator act on the floor."""
     random = np.random.default_rng(6)
     damper = TunedMassDamper(m=50.0, c=20.0, k=500.0)
     for _ in range(10):

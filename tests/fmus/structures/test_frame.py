@@ -26,7 +26,7 @@ def deflected(frame: Frame, node: str, direction: str) -> dict[str, float]:
 def test_a_cantilever_is_timoshenkos(axis: str, direction: str) -> None:
     """Tip: P L^3 / 3 EI + P L / GA, and a rotation of P L^2 / 2 EI about axis x direction.
 
-    The element is exact, also where there are several: 1e-9 is what the solver leaves.
+    The element is exact, also in a series of several: the solver leaves 1e-9.
     """
     L, members = 2.4, 3
     frame = Frame()

@@ -1,4 +1,4 @@
-"""The structural model: its shapes, its named degrees of freedom, and what it refuses."""
+"""The structural model: its shapes, its named degrees of freedom, and its errors."""
 
 from __future__ import annotations
 
