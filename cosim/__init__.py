@@ -6,10 +6,11 @@ Everything that a user needs is here, in `cosim.blocks` (sources, sensors, filte
 and in `cosim.functions` (vectors and matrices in kernels).
 """
 
+from .arrays import Array
 from .core.component import Component
 from .core.participant import Block, Continuous, LinearContinuous, Participant
 from .core.port import Port
-from .core.variables import Array, Input, Local, Output, Parameter, State
+from .core.variables import Input, Local, Output, Parameter, State
 from .errors import (
     CompilationError,
     CompiledKernelsWarning,

@@ -1,4 +1,4 @@
-"""Errors that say where, what, and what to do about it; and warnings.
+"""The errors and warnings of cosim; the text of an error gives the place, the fault and the remedy.
 
 Every error that a user can cause derives from `CosimError`. The command line prints its
 text and ends with exit code 2; a traceback means a defect of structcosim itself.
@@ -6,12 +6,12 @@ text and ends with exit code 2; a traceback means a defect of structcosim itself
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 
 class CosimError(Exception):
-    """An error with a place, a fact and a remedy."""
+    """An error with a place, a fault and a remedy."""
 
 
 class DeclarationError(CosimError):
@@ -43,11 +43,11 @@ class OptionError(CosimError):
 
 
 class SnapshotError(CosimError):
-    """A state that cannot be saved or returned to."""
+    """A state that cannot be saved or restored."""
 
 
 class SimulationEndedWarning(UserWarning):
-    """A participant asked to end the run before its stop time: a normal end; see `Result.ended`."""
+    """A component asked to end the run before its stop time: a normal end; see `Result.ended`."""
 
 
 class CompiledKernelsWarning(UserWarning):
@@ -56,6 +56,14 @@ class CompiledKernelsWarning(UserWarning):
 
 class LateEventWarning(UserWarning):
     """An event was handled at the end of the step in which it occurs."""
+
+
+def check_known(
+    what: str, value: object, known: Collection[str], error: type[CosimError] = OptionError
+) -> None:
+    """Raise `error` if a value is not one of the known names."""
+    if value not in known:
+        raise error(f"{what} '{value}' is not known" + did_you_mean(value, known))
 
 
 def did_you_mean(name: object, candidates: Iterable[str]) -> str:

@@ -1,7 +1,7 @@
 """Functions for kernels: no allocation, no Python runtime, results in the caller's memory.
 
-They are plain Python, so that a kernel in a debugger runs the very same code. A kernel may
-also call any function of the user's own that keeps to Numba's subset.
+They are plain Python, so that a kernel in a debugger runs the same code. A kernel may also
+call any other function that keeps to the subset of Python that Numba compiles.
 """
 
 from __future__ import annotations
@@ -151,8 +151,8 @@ def expm(work: Array) -> None:
     """work[0] = e^work[0], by balancing, scaling, the Taylor polynomial of degree 18, and squaring.
 
     work (4, n, n): the matrix, and three matrices of working memory. Scaled to a norm of
-    1 the remainder is below 1/19! = 8e-18. The code has a single product of matrices,
-    because each one that is written costs a second of compilation.
+    1, the remainder is below 1/19! = 8e-18. The code calls `matmul` in one place only,
+    because each call costs a second of compilation.
     """
     n = work.shape[1]
     A, S, W, d = work[0], work[1], work[2], work[3, 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
 
 
-#: the fields that .npz keeps beside time, signals and statistics
+#: the fields that .npz keeps besides time, signals and statistics
 _SAVED = ("units", "step", "steps", "seconds", "schedule", "interrupted", "ended")
 
 
@@ -69,7 +69,7 @@ class Result:
     interrupted
         True when the run was stopped before its end; the result holds the part that was computed
     ended
-        the participant that asked to end the run before its stop time, and when; "" if none did
+        the component that asked to end the run before its stop time, and when; "" if none did
     """
 
     time: Array
@@ -123,8 +123,8 @@ class Result:
             kept = {name: getattr(self, name) for name in _SAVED}
             texts = {n: [_as_json(v) for v in values] for n, values in self.texts.items()}
             definitions = {n: [d.exponents, d.factor, d.offset] for n, d in self.definitions.items()}
-            more = {"statistics": self._listed(), "texts": texts, "definitions": definitions}
-            meta = json.dumps(kept | more)
+            statistics = {n: [np.asarray(v).tolist() for v in astuple(s)] for n, s in self.statistics.items()}
+            meta = json.dumps(kept | {"statistics": statistics, "texts": texts, "definitions": definitions})
             arrays: dict[str, Any] = {"time": self.time, **self.signals}
             np.savez(path, _meta=np.array(meta), **arrays)
         elif path.suffix == ".csv":
@@ -143,28 +143,13 @@ class Result:
             with np.load(path) as data:
                 meta = json.loads(str(data["_meta"]))
                 signals = {n: data[n] for n in data.files if n not in ("_meta", "time")}
-                listed = meta.pop("statistics")
-                statistics = {port: Statistics(*map(_values, values)) for port, values in listed.items()}
-                saved = meta.pop("texts", {})
-                texts = {n: [_from_json(v) for v in values] for n, values in saved.items()}
-                units = meta.pop("definitions", {})
-                definitions = {n: Definition(tuple(powers), *rest) for n, (powers, *rest) in units.items()}
-                return cls(
-                    data["time"],
-                    signals,
-                    statistics=statistics,
-                    texts=texts,
-                    definitions=definitions,
-                    **meta,
-                )
+                texts, units = meta.get("texts", {}), meta.get("definitions", {})
+                meta["statistics"] = {n: Statistics(*map(_values, s)) for n, s in meta["statistics"].items()}
+                meta["texts"] = {n: [_from_json(v) for v in values] for n, values in texts.items()}
+                meta["definitions"] = {n: Definition(tuple(p), *rest) for n, (p, *rest) in units.items()}
+                return cls(data["time"], signals, **meta)
         except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, BadZipFile) as error:
             raise RecordError(f"{path} is not a result saved as .npz: {error}") from error
-
-    def _listed(self) -> dict[str, list[Any]]:
-        return {
-            port: [np.asarray(getattr(s, f.name)).tolist() for f in fields(s)]
-            for port, s in self.statistics.items()
-        }
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a DataFrame with the time as index; needs pandas."""

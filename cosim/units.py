@@ -4,8 +4,8 @@ A unit has a name, and where an FMU or an SSP defines it, a definition by SI bas
 
     value in base units = factor * value + offset
 
-A definition applies wherever there is one; pint gives the meaning of all other names. The
-spellings of FMUs ("m/s2", "N.m", "kg m s-2") are accepted beside "m/s^2" and "N*m".
+A definition takes precedence; pint defines all other names. The spellings of FMUs ("m/s2",
+"N.m", "kg m s-2") are accepted as well as "m/s^2" and "N*m".
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def parse(unit: str) -> Any:
         if text is None:
             raise ValueError("this is not a product of powers of units")
         return registry().Unit(text)
-    except Exception as error:  # pint raises many types, without a base class of its own
+    except Exception as error:  # pint raises many types that share no base class
         shown = unit if len(unit) <= _MAX_LENGTH else f"{unit[:_MAX_LENGTH]}..."
         raise WiringError(
             f"unit '{shown}' is not known; write it as pint or FMI do, for example m/s^2, kN*s/m, rad/s"
@@ -171,7 +171,7 @@ def conversion(
 
 
 def _is_usual(name: str, given: Definition) -> bool:
-    """Tell whether a definition is what pint knows of the name; many FMUs leave the radian out."""
+    """Tell whether a definition agrees with pint's for the name; many FMUs omit the radian."""
     try:
         known = definition(name)
     except WiringError:
@@ -201,11 +201,11 @@ def _by_name(source: str, target: str) -> tuple[float, float]:
 
 
 def _refuse_cycles(source: str, target: str) -> None:
-    """Refuse cycles for radians: to pint and in many FMUs both are 1/s, without the 2 pi."""
+    """Refuse to convert cycles to radians: pint and many FMUs take both for 1/s, without the 2 pi."""
     try:
         names = [str(parse(unit)) for unit in (source, target)]
     except WiringError:
-        return  # a name of the FMU's own
+        return  # a name that only the FMU defines
     angles = [bool(re.search("radian|degree|turn|revolution", name)) for name in names]
     cycles = ["hertz" in name for name in names]
     if (angles[0] and cycles[1]) or (cycles[0] and angles[1]):

@@ -13,26 +13,25 @@ from typing import Any
 
 import numpy as np
 
-from controllers.design.state_space import StateSpace
+from controllers.design.design_model import DesignModel
 from controllers.laws.state_feedback import StateFeedback
 from controllers.observers.observer import Observer
 from cosim import Result, System, el_centro, simulate
 from cosim.blocks import MeasurementNoise, RecordSource, Saturation
 from fmus.export import as_fmu
-from fmus.plants.shear_building import ShearBuilding
+from fmus.plants.shear_building import ShearBuilding, stiffness_matrix
 
 STEP, STOP = 0.005, 40.0
 MASS, STIFFNESS, DAMPING = [20e3] * 5, [30e6, 28e6, 25e6, 20e6, 15e6], 0.02  # kg, N/m, of critical
 
 
-def design_model(building: ShearBuilding) -> StateSpace:
-    """Return x' = A x + B u + E a_g of displacements and velocities; measured: the roof's acceleration."""
-    m, k = np.diag(MASS), np.array([*STIFFNESS, 0.0])
-    K = np.diag(k[:-1] + k[1:]) - np.diag(k[1:-1], 1) - np.diag(k[1:-1], -1)
+def design_model(building: ShearBuilding) -> DesignModel:
+    """Return x' = A x + B u + E a_g of displacements and velocities; the roof's acceleration is measured."""
+    m, K = np.diag(MASS), stiffness_matrix(np.array(STIFFNESS))
     n, roof = len(m), np.eye(len(m))[:, -1:]
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(m, np.hstack([K, building.C]))]])
     B, E = np.vstack([0 * roof, np.linalg.solve(m, roof)]), np.vstack([0 * roof, -np.ones((n, 1))])
-    return StateSpace(A=A, B=B, E=E, C=A[-1:], D=B[-1:], F=np.zeros((1, 1)))
+    return DesignModel(A=A, B=B, E=E, C=A[-1:], D=B[-1:], F=np.zeros((1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True)

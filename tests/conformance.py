@@ -144,7 +144,7 @@ TABLE: dict[str, list[Row]] = {
             "probe, ball",
             [f"{F3}::test_a_request_to_end_ends_the_run", f"{ME}::test_a_request_to_end_in_an_event"],
         ),
-        both("one instance per process", "probe", [f"{F3}::test_an_fmu_that_can_be_there_only_once"]),
+        both("one instance per process", "probe", [f"{F3}::test_an_fmu_with_one_instance_per_process"]),
         both(
             "instances of one FMU share an extraction",
             "ours",
@@ -154,7 +154,7 @@ TABLE: dict[str, list[Row]] = {
             "start values and parameters by name",
             "ours, probe",
             [
-                "cosim/fmi/test_fmu.py::test_start_values_of_parameters_and_of_inputs_that_nothing_feeds",
+                "cosim/fmi/test_fmu.py::test_start_values_of_parameters_and_of_unconnected_inputs",
                 f"{F3}::test_units_strings_and_dependencies",
             ],
         ),
@@ -386,14 +386,14 @@ TABLE: dict[str, list[Row]] = {
         both(
             "what is fine is said to be fine",
             "ours",
-            [f"{DOCTOR}::test_an_fmu_of_ours_has_nothing_above_a_note"],
+            [f"{DOCTOR}::test_an_exported_fmu_has_nothing_above_a_note"],
         ),
         both(
             "faults are found by the probe that is for them, crashes among them",
             "bad, probe, pythonfmu",
             [
                 f"{DOCTOR}::test_a_fault_is_found",
-                f"{DOCTOR}::test_what_takes_the_process_with_it_is_found",
+                f"{DOCTOR}::test_a_fault_that_ends_or_stops_the_process_is_found",
                 "test_conformance.py::test_the_doctor_on_fmus_of_fmi_3_that_are_not_ours",
             ],
         ),
@@ -422,7 +422,7 @@ TABLE: dict[str, list[Row]] = {
             "several instances of what a process can have once only",
             "probe",
             [
-                f"{ISOLATED}::test_several_instances_of_what_a_process_can_have_once_only",
+                f"{ISOLATED}::test_several_instances_of_an_fmu_that_a_process_can_have_only_once",
                 "test_conformance.py::test_isolated_instances_of_fmi_3_that_a_process_can_have_once_only",
             ],
         ),

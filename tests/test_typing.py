@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_readme import script_after
-
-ROOT = Path(__file__).parents[1]
+from tests.readme import ROOT, code_blocks
 
 FRAME = '''
 from cosim import Block, Continuous, Input, Output, Parameter, Result, State, System, simulate
@@ -80,8 +78,8 @@ def test_a_user_file_passes_strictly(tmp_path):
     assert mypy(tmp_path, FRAME, "--strict").startswith("Success")
 
 
-def test_the_smallest_script_passes(tmp_path):
-    script = script_after("## The smallest script")
+def test_the_script_of_the_readme_passes(tmp_path):
+    (script,) = code_blocks(ROOT / "README.md")
     assert mypy(tmp_path, script, "--check-untyped-defs").startswith("Success")
 
 

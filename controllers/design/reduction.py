@@ -26,7 +26,7 @@ are displacements R x, then absolute accelerations S (x'' + I a_g), which carry 
 
 Sources: R. J. Guyan, Reduction of stiffness and mass matrices, AIAA Journal 3 (1965) 380,
 DOI 10.2514/3.2874. E. J. Davison, A method for simplifying linear dynamic systems, IEEE
-Transactions on Automatic Control 11 (1966) 93-101, DOI 10.1109/TAC.1966.1098264.
+Transactions on Automatic Control 11 (1966) 93-101.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ import scipy.linalg as la
 
 from cosim import Array
 
+from .design_model import DesignModel, first_order
 from .riccati import DesignError
-from .state_space import StateSpace, first_order
 
 
 def static_condensation(M: Array, K: Array, keep: Sequence[int]) -> tuple[Array, Array, Array]:
@@ -90,7 +90,7 @@ def dominant_modes(
     disturbance: Array,
     keep: Sequence[int],
     measured: Sequence[int],
-) -> StateSpace:
+) -> DesignModel:
     """Return the model in displacements and velocities of the degrees of freedom `keep`, (1) to (3).
 
     M, C, K (n, n); force (n, m) and disturbance (n, p): forces of a unit u and a unit w;
@@ -123,7 +123,9 @@ def dominant_modes(
     rows = V[np.asarray(measured, int) + n]
     m = force.shape[1]
     BE, DF = T @ modal, rows @ modal
-    return StateSpace(A=T @ L @ T_inv, B=BE[:, :m], E=BE[:, m:], C=rows @ L @ T_inv, D=DF[:, :m], F=DF[:, m:])
+    return DesignModel(
+        A=T @ L @ T_inv, B=BE[:, :m], E=BE[:, m:], C=rows @ L @ T_inv, D=DF[:, :m], F=DF[:, m:]
+    )
 
 
 def modal_state_space(
@@ -135,7 +137,7 @@ def modal_state_space(
     displacements: Array,
     accelerations: Array,
     modes: int,
-) -> tuple[StateSpace, Array]:
+) -> tuple[DesignModel, Array]:
     """Return the model of 2 `modes` states, (4) and (5), and Phi (n, modes).
 
     M, C, K (n, n); influence (n, directions); actuators B_u', displacements R and
@@ -155,7 +157,7 @@ def modal_state_space(
     E = np.vstack([np.zeros_like(quake), quake])
     R, S = displacements @ Phi, accelerations @ Phi
     r = len(R)
-    return StateSpace(
+    return DesignModel(
         A=A, B=B, E=E,
         C=np.vstack([np.hstack([R, np.zeros_like(R)]), S @ acceleration]),
         D=np.vstack([np.zeros((r, force.shape[1])), S @ force]),

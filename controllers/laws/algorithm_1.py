@@ -20,11 +20,13 @@ from cosim.functions import sign
 class AlgorithmI(Block):
     """M is divided by `rate` at every change of sign of s, down to M_min; M=... sets its start."""
 
+    DEFAULT_UNITS = {"unit": "N"}
+
     rate = Parameter(1.1, "divisor of the gain at a switch", unit="1", min=1.0)
-    M_min = Parameter(1.0, "floor of the gain, not printed", unit="N", min=0.0)
+    M_min = Parameter(1.0, "floor of the gain, not printed", unit="$unit", min=0.0)
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = State(100.0, "gain", unit="N")
+    u = Output("control force", unit="$unit")
+    M = State(100.0, "gain", unit="$unit")
     sgn = Output("sign of s", unit="1")
     last = Local(0.0, "last sign that was not 0")
 

@@ -21,13 +21,15 @@ from cosim.functions import clip, sign
 class AlgorithmII(Block):
     """M rises by alpha T_s and falls by beta T_s at every change of sign of s; M=... sets its start."""
 
-    alpha = Parameter(10.0, "rate of increase", unit="N/s", min=0.0)
-    beta = Parameter(300.0, "decrease at a switch, per second of T_s", unit="N/s", min=0.0)
-    M1 = Parameter(1.0, "lower bound of the gain", unit="N", min=0.0)
-    M2 = Parameter(300.0, "upper bound of the gain", unit="N", min=0.0)
+    DEFAULT_UNITS = {"unit": "N"}
+
+    alpha = Parameter(10.0, "rate of increase", unit="$unit/s", min=0.0)
+    beta = Parameter(300.0, "decrease at a switch, per second of T_s", unit="$unit/s", min=0.0)
+    M1 = Parameter(1.0, "lower bound of the gain", unit="$unit", min=0.0)
+    M2 = Parameter(300.0, "upper bound of the gain", unit="$unit", min=0.0)
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = State(150.0, "gain", unit="N")
+    u = Output("control force", unit="$unit")
+    M = State(150.0, "gain", unit="$unit")
     sgn = Output("sign of s", unit="1")
     last = Local(0.0, "last sign that was not 0")
 

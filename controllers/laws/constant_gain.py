@@ -11,12 +11,14 @@ from cosim.functions import sign
 
 
 class ConstantGain(Block):
-    """u = -M_0 sgn s; the output M is M_0, as the other gain laws have it."""
+    """u = -M_0 sgn s; the output M is M_0, as in the other gain laws."""
 
-    M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
+    DEFAULT_UNITS = {"unit": "N"}
+
+    M_0 = Parameter(100.0, "gain", unit="$unit", min=0.0)
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = Output("gain in use", unit="N")
+    u = Output("control force", unit="$unit")
+    M = Output("gain in use", unit="$unit")
     sgn = Output("sign of s", unit="1")
 
     def step(self, t: float, h: float) -> None:

@@ -19,7 +19,7 @@ import scipy.linalg as la
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import matvec, matvec_add
 
-from ..design.state_space import StateSpace
+from ..design.design_model import DesignModel
 from ..design.surface_design import optimal_surface, require_regular
 
 
@@ -40,7 +40,7 @@ class ContinuousSlidingMode(Block):
 
     @classmethod
     def design(
-        cls, model: StateSpace, Q: Array, rate: float, every: int | None = None
+        cls, model: DesignModel, Q: Array, rate: float, every: int | None = None
     ) -> ContinuousSlidingMode:
         """Make the controller with the surface of `optimal_surface` and the weight Q.
 

@@ -12,7 +12,7 @@ Away from the surface |z| tends to 1 and M to M_0 (1 + delta); in a sliding mode
 the equivalent control. The thesis gives no numbers for M_0, delta and tau.
 
 Source: H. Lee and V. I. Utkin, Chattering suppression methods in sliding mode control
-systems, Annual Reviews in Control 31 (2007) 179-188, DOI 10.1016/j.arcontrol.2007.08.001.
+systems, Annual Reviews in Control 31 (2007) 179-188.
 """
 
 import math
@@ -24,12 +24,14 @@ from cosim.functions import sign
 class EquivalentControlGain(Block):
     """M = M_0 (|z| + delta), where z averages sgn s; z starts at 1, its value away from the surface."""
 
-    M_0 = Parameter(100.0, "gain on the average", unit="N", min=0.0)
+    DEFAULT_UNITS = {"unit": "N"}
+
+    M_0 = Parameter(100.0, "gain on the average", unit="$unit", min=0.0)
     delta = Parameter(0.01, "least average", unit="1", min=0.0)
     tau = Parameter(0.1, "time constant of the average", unit="s", min=1e-12)
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = Output("gain", unit="N")
+    u = Output("control force", unit="$unit")
+    M = Output("gain", unit="$unit")
     sgn = Output("sign of s", unit="1")
     z = State(1.0, "average of sgn(s)", unit="1")
     before = Local(0.0, "time of the last call", unit="s")

@@ -15,8 +15,8 @@ import numpy as np
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import dot
 
+from ..design.design_model import DesignModel
 from ..design.riccati import DesignError
-from ..design.state_space import StateSpace
 from ..design.surface_design import optimal_surface, require_regular
 
 
@@ -44,7 +44,7 @@ class EquivalentForce(Block):
         self.u = self.PB_inv * (self.switching - dot(self.PA, self.x_hat))
 
 
-def design(model: StateSpace, Q: Array) -> tuple[StateSurface, EquivalentForce]:
+def design(model: DesignModel, Q: Array) -> tuple[StateSurface, EquivalentForce]:
     """Make the surface and the force for one actuator; Q (n, n) as for `SlidingMode.design`."""
     if model.B.shape[1] != 1:
         raise DesignError(

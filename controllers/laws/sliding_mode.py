@@ -16,7 +16,7 @@ import scipy.linalg as la
 from cosim import Array, Block, Input, Local, Output, Parameter
 from cosim.functions import matvec, norm, sign
 
-from ..design.state_space import StateSpace
+from ..design.design_model import DesignModel
 from ..design.surface_design import optimal_surface, require_regular
 
 
@@ -43,7 +43,7 @@ class SlidingMode(Block):
 
     @classmethod
     def design(
-        cls, model: StateSpace, Q: Array, a: float = 1.065, delta: float = 0.001, every: int | None = None
+        cls, model: DesignModel, Q: Array, a: float = 1.065, delta: float = 0.001, every: int | None = None
     ) -> SlidingMode:
         """Make the controller with the surface that minimises int x' Q x dt, (2.10) to (2.13)."""
         P = optimal_surface(model.A, model.B, Q)

@@ -7,7 +7,7 @@
 has no unit of its own. The thesis gives no numbers for M_0 and delta.
 
 Source: H. Lee and V. I. Utkin, Chattering suppression methods in sliding mode control
-systems, Annual Reviews in Control 31 (2007) 179-188, DOI 10.1016/j.arcontrol.2007.08.001.
+systems, Annual Reviews in Control 31 (2007) 179-188.
 """
 
 from cosim import Block, Input, Output, Parameter
@@ -15,18 +15,18 @@ from cosim.functions import norm, sign
 
 
 class StateDependentGain(Block):
-    """M = M_0 (|x| + delta) with x[1] to x[n]; n is 2 unless it is given."""
+    """M = M_0 (|x| + delta) with x[1] to x[n]; n is 2 by default."""
+
+    DEFAULT_SIZES = {"n": 2}
+    DEFAULT_UNITS = {"unit": "N"}
 
     M_0 = Parameter(10.0, "gain on the norm of the state", min=0.0)
     delta = Parameter(0.1, "least norm", min=0.0)
     x = Input("state", shape="n")
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = Output("gain", unit="N")
+    u = Output("control force", unit="$unit")
+    M = Output("gain", unit="$unit")
     sgn = Output("sign of s", unit="1")
-
-    def __init__(self, M_0: float = 10.0, delta: float = 0.1, *, n: int = 2) -> None:
-        super().__init__(M_0=M_0, delta=delta, n=n)
 
     def step(self, t: float, h: float) -> None:
         self.sgn = sign(self.s)

@@ -12,8 +12,8 @@ from __future__ import annotations
 from cosim import Array, Block, Input, Output, Parameter
 from cosim.functions import matvec
 
+from ..design.design_model import DesignModel
 from ..design.riccati import regulator
-from ..design.state_space import StateSpace
 
 
 class StateFeedback(Block):
@@ -28,7 +28,7 @@ class StateFeedback(Block):
 
     @classmethod
     def lqr(
-        cls, model: StateSpace, Q: Array, R: Array, N: Array | None = None, every: int | None = None
+        cls, model: DesignModel, Q: Array, R: Array, N: Array | None = None, every: int | None = None
     ) -> StateFeedback:
         """Make the linear-quadratic regulator of a model."""
         _, K = regulator(model.A, model.B, Q, R, N, what="LQR")

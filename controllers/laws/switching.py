@@ -36,12 +36,14 @@ def hysteresis(s: float, width: float, before: float) -> float:
 class SaturationControl(Block):
     """u = -M_0 sat s, by (1) or, with scaled=1, by (2)."""
 
-    M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
+    DEFAULT_UNITS = {"unit": "N"}
+
+    M_0 = Parameter(100.0, "gain", unit="$unit", min=0.0)
     gamma = Parameter(0.1, "half width of the boundary layer", min=0.0)
     scaled = Parameter(0.0, "0: (1), as printed; 1: (2), continuous", min=0.0, max=1.0)
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = Output("gain", unit="N")
+    u = Output("control force", unit="$unit")
+    M = Output("gain", unit="$unit")
     sgn = Output("sign of s", unit="1")
 
     def step(self, t: float, h: float) -> None:
@@ -56,11 +58,13 @@ class SaturationControl(Block):
 class HysteresisControl(Block):
     """u = -M_0 hys s: it switches only when s has left [-width, width] on the other side."""
 
-    M_0 = Parameter(100.0, "gain", unit="N", min=0.0)
+    DEFAULT_UNITS = {"unit": "N"}
+
+    M_0 = Parameter(100.0, "gain", unit="$unit", min=0.0)
     width = Parameter(0.1, "half width of the loop", min=0.0)
     s = Input("sliding variable")
-    u = Output("control force", unit="N")
-    M = Output("gain", unit="N")
+    u = Output("control force", unit="$unit")
+    M = Output("gain", unit="$unit")
     sgn = Output("sign of s", unit="1")
     before = Local(0.0, "switching function in the last call")
 

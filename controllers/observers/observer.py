@@ -25,11 +25,11 @@ import scipy.linalg as la
 from cosim import Array, Block, Input, Local, Parameter, State
 from cosim.functions import assign, matvec, matvec_add
 
+from ..design.design_model import DesignModel
 from ..design.riccati import regulator
-from ..design.state_space import StateSpace
 
 
-def observer_gain(model: StateSpace, S_ww: Array, S_vv: Array) -> Array:
+def observer_gain(model: DesignModel, S_ww: Array, S_vv: Array) -> Array:
     """Return L (n, r) of (2.6); S_ww (p, p) and S_vv (r, r) are the spectral densities of w and v."""
     Q_0 = model.E @ S_ww @ model.E.T
     S_0 = model.E @ S_ww @ model.F.T
@@ -59,13 +59,13 @@ class Observer(Block):
         assign(self.x_next, self.x_hat)
 
     @classmethod
-    def design(cls, model: StateSpace, S_ww: Array, S_vv: Array, period: float) -> Observer:
+    def design(cls, model: DesignModel, S_ww: Array, S_vv: Array, period: float) -> Observer:
         """Make the observer of a model with the gain (2.6), for a sample period in s."""
         A_d, B_d, L_d = discretise(model, observer_gain(model, S_ww, S_vv), period)
         return cls(A_d=A_d, B_d=B_d, L_d=L_d, sample_period=period)
 
 
-def discretise(model: StateSpace, L: Array, period: float) -> tuple[Array, Array, Array]:
+def discretise(model: DesignModel, L: Array, period: float) -> tuple[Array, Array, Array]:
     """Return A_d, B_d, L_d of the observer with the gain L (n, r), exact for held u and y."""
     n, m = model.B.shape
     inputs = np.hstack([model.B - L @ model.D, L])

@@ -38,7 +38,6 @@ class AnalogToDigital(Block):
         levels = 2.0 ** (self.bits - 1.0)
         for i in range(self.y.shape[0]):
             q = self.full_scale[i] / levels
-            code = clip(
-                self.u[i] / q, -levels, levels
-            )  # before floor, which needs a number in the range of integers
+            # limited before floor, which needs a number in the range of integers
+            code = clip(self.u[i] / q, -levels, levels)
             self.y[i] = q * clip(math.floor(code + 0.5) * 1.0, -levels, levels - 1.0)

@@ -1,4 +1,4 @@
-"""Measurement noise: a signal is sampled, and every sample has an error of its own."""
+"""Measurement noise: a signal is sampled, and each sample has an independent error."""
 
 from __future__ import annotations
 

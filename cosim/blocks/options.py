@@ -6,14 +6,14 @@ from typing import TypedDict
 
 
 class Sampled(TypedDict, total=False):
-    """When a block acts; see `Block`."""
+    """The instants at which a block acts; see `Block`."""
 
     every: int | None
     sample_period: float | None
 
 
 class Signal(TypedDict, total=False):
-    """What a block passes: any signal.
+    """The signal that a block passes on.
 
     n
         number of elements: by default as many as the given arrays have, otherwise 1
@@ -26,4 +26,4 @@ class Signal(TypedDict, total=False):
 
 
 class SampledSignal(Sampled, Signal, total=False):
-    """A signal, and when the block acts."""
+    """A signal, and the instants at which the block acts."""

@@ -27,42 +27,27 @@ import math
 
 import numpy as np
 
-from ..core.variables import Array
+from ..arrays import Array
 
 M1 = 4294967087.0
 M2 = 4294944443.0
 MODULI = np.array([M1, M2])
+#: for m1 and m2: the matrix that carries the state on by one number
+_STEP = np.array(
+    [[[0, 1, 0], [0, 0, 1], [-810728, 1403580, 0]], [[0, 1, 0], [0, 0, 1], [-1370589, 0, 527612]]],
+    dtype=object,
+)
 
-#: for m1 and m2: the matrix that carries the state on by 2^127 numbers, A^(2^127) mod m
-SEED_JUMP = np.array(
-    [
-        [
-            [2427906178.0, 3580155704.0, 949770784.0],
-            [226153695.0, 1230515664.0, 3580155704.0],
-            [1988835001.0, 986791581.0, 1230515664.0],
-        ],
-        [
-            [1464411153.0, 277697599.0, 1610723613.0],
-            [32183930.0, 1464411153.0, 1022607788.0],
-            [2824425944.0, 32183930.0, 2093834863.0],
-        ],
-    ]
-)
-#: the same for 2^76 numbers
-STREAM_JUMP = np.array(
-    [
-        [
-            [82758667.0, 1871391091.0, 4127413238.0],
-            [3672831523.0, 69195019.0, 1871391091.0],
-            [3672091415.0, 3528743235.0, 69195019.0],
-        ],
-        [
-            [1511326704.0, 3759209742.0, 1610795712.0],
-            [4292754251.0, 1511326704.0, 3889917532.0],
-            [3859662829.0, 4292754251.0, 3708466080.0],
-        ],
-    ]
-)
+
+def _jump(doublings: int) -> Array:
+    """Return, for m1 and m2, the matrix that carries the state on by 2^doublings numbers; (2, 3, 3)."""
+    A = _STEP
+    for _ in range(doublings):
+        A = A @ A % np.array([int(M1), int(M2)], dtype=object)[:, None, None]
+    return A.astype(np.float64)
+
+
+SEED_JUMP, STREAM_JUMP = _jump(127), _jump(76)
 
 
 def remainder(v: float, m: float) -> float:
@@ -113,8 +98,8 @@ def advance_state_by_power(work: Array, power: float, x: Array, m: float) -> Non
 def seed_streams(seed: float, streams: Array, work: Array) -> None:
     """Place every row of streams (n, 6) at the start of its stream; work (3, 3, 3).
 
-    It has loops in place of `assign`, because every further function and kind of array costs
-    a third of a second of compilation.
+    Loops stand in place of `assign`, because each further function and kind of array costs a
+    third of a second of compilation.
     """
     for part in range(2):
         first = 3 * part

@@ -8,8 +8,9 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..core.participant import Continuous, LinearContinuous
-from ..core.variables import Array, Input, Local, Output, Parameter, State
+from ..core.variables import Input, Local, Output, Parameter, State
 from ..errors import DeclarationError
 from ..functions import dot
 from .options import Signal
@@ -54,8 +55,8 @@ class SensorDynamics(Continuous):
             self.z[i] = decay * ((1.0 - r) * z - r * e / self.mu)
 
 
-class StrictlyProper(LinearContinuous):
-    """x' = A x + B u, y = C x: a sensor with an output that does not depend directly on its input."""
+class _LinearSensor(LinearContinuous):
+    """x' = A x + B u"""
 
     A = Parameter(0.0, "dynamics", shape=("n", "n"), fixed=True)
     B = Parameter(0.0, "input", shape=("n", "m"), fixed=True)
@@ -64,37 +65,31 @@ class StrictlyProper(LinearContinuous):
     x = State(0.0, "state", shape="n")
     y = Output("measured signal", unit="$unit", shape="p")
 
-    def __init__(self, A: ArrayLike, B: ArrayLike, C: ArrayLike, *, unit: str | None = None) -> None:
-        super().__init__(A=A, B=B, C=C, unit=unit)
-
     def derivatives(self, t: float) -> None:
         for i in range(self.x.shape[0]):
             self.der_x[i] = dot(self.A[i], self.x) + dot(self.B[i], self.u)
+
+
+class StrictlyProper(_LinearSensor):
+    """x' = A x + B u, y = C x: a sensor with an output that does not depend directly on its input."""
+
+    def __init__(self, A: ArrayLike, B: ArrayLike, C: ArrayLike, *, unit: str | None = None) -> None:
+        super().__init__(A=A, B=B, C=C, unit=unit)
 
     def outputs(self, t: float) -> None:
         for i in range(self.y.shape[0]):
             self.y[i] = dot(self.C[i], self.x)
 
 
-class StateSpace(LinearContinuous):
+class StateSpace(_LinearSensor):
     """x' = A x + B u, y = C x + D u; use `StrictlyProper` without D, so that no direct path closes a loop."""
 
-    A = Parameter(0.0, "dynamics", shape=("n", "n"), fixed=True)
-    B = Parameter(0.0, "input", shape=("n", "m"), fixed=True)
-    C = Parameter(0.0, "output", shape=("p", "n"), fixed=True)
     D = Parameter(0.0, "direct path", shape=("p", "m"), fixed=True)
-    u = Input("true signal", unit="$unit", shape="m")
-    x = State(0.0, "state", shape="n")
-    y = Output("measured signal", unit="$unit", shape="p")
 
     def __init__(
         self, A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, *, unit: str | None = None
     ) -> None:
         super().__init__(A=A, B=B, C=C, D=D, unit=unit)
-
-    def derivatives(self, t: float) -> None:
-        for i in range(self.x.shape[0]):
-            self.der_x[i] = dot(self.A[i], self.x) + dot(self.B[i], self.u)
 
     def outputs(self, t: float) -> None:
         for i in range(self.y.shape[0]):

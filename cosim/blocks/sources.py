@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..core.participant import Block
 from ..core.variables import Local, Output, Parameter
-from ..errors import DeclarationError, did_you_mean
+from ..errors import DeclarationError, check_known
 from ..ground_motion.ground_motion import GroundMotion
 from .options import Sampled, Signal
 from .random_stream import normal, seed_streams
@@ -64,9 +64,7 @@ class RecordSource(Block):
         **sampled: Unpack[Sampled],
     ) -> None:
         """Take a GroundMotion with its dt, unit and start, or values with dt and unit."""
-        if interpolation not in ("linear", "hold"):
-            hint = did_you_mean(str(interpolation), ["linear", "hold"])
-            raise DeclarationError(f"RecordSource: interpolation '{interpolation}' is not known{hint}")
+        check_known("RecordSource: interpolation", interpolation, ("linear", "hold"), DeclarationError)
         if isinstance(record, GroundMotion):
             if dt is not None:
                 raise DeclarationError(
@@ -128,7 +126,7 @@ def function_source(
         function_source(lambda t: 25.0 * (math.sin(t) + 1.0), unit="m/s^2")
 
     A function in Numba's subset is compiled with the block, closures over numbers
-    included; any other runs as a callback, of which the run warns.
+    included; any other runs as a callback, with a CompiledKernelsWarning.
     """
     if not callable(function):
         raise DeclarationError(f"function_source needs a function of time, got {function!r}")

@@ -8,9 +8,10 @@ from typing import Literal, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..core.participant import Block
-from ..core.variables import Array, Output, Parameter
-from ..errors import DeclarationError, did_you_mean
+from ..core.variables import Output, Parameter
+from ..errors import DeclarationError, check_known
 from .options import Sampled
 
 
@@ -22,7 +23,7 @@ class TableSource(Block):
         linear:  y = v_i + q (v_{i+1} - v_i),  q = (t - t_i) / (t_{i+1} - t_i)
 
     Two rows at one instant are a jump: the second counts there. An instant that is less
-    than 1e-9 of a step after t is at t.
+    than 1e-9 of a step after t counts as t.
 
     At a constant interval, t_i = i interval, the row is found by division:
 
@@ -45,9 +46,7 @@ class TableSource(Block):
         **sampled: Unpack[Sampled],
     ) -> None:
         """Take (n,) instants in s that do not decrease, or one interval, and (n,) or (n, m) values."""
-        if interpolation not in ("linear", "hold"):
-            hint = did_you_mean(str(interpolation), ["linear", "hold"])
-            raise DeclarationError(f"TableSource: interpolation '{interpolation}' is not known{hint}")
+        check_known("TableSource: interpolation", interpolation, ("linear", "hold"), DeclarationError)
         t: Array = np.asarray(instants, dtype=np.float64)
         v: Array = np.asarray(rows, dtype=np.float64)
         v = v[:, None] if v.ndim == 1 else v

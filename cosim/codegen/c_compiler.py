@@ -1,7 +1,7 @@
 """The C compiler: `python -m ziglang cc`, which links for every platform from any machine.
 
-It compiles for the lowest CPU level of each platform and an old C library, so that a
-library that was linked here runs on any such machine. FMI's headers come with FMPy.
+It compiles for the lowest CPU level of each platform and an old C library, so that the
+libraries that it links run on any such machine. FMPy includes the FMI headers.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def complaint(stderr: str) -> str:
 
 
 def fmi_headers() -> Path:
-    """Return the folder of the FMI headers: FMPy carries them."""
+    """Return the folder of the FMI headers, which FMPy includes."""
     spec = importlib.util.find_spec("fmpy")
     folder = Path(spec.origin).parent / "c-code" if spec and spec.origin else Path("c-code")
     if not (folder / "fmi2Functions.h").exists():

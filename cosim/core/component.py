@@ -8,12 +8,12 @@ options, and a run does not change it. It is used in this order:
    ports stay the same from then on.
 2. `System.connect` looks up ports by name, compares kind, shape and unit, and orders the
    components with `as_block` along their connections.
-3. A run reads `declared_outputs`, where it is not told what to record, and `every` and
-   `sample_period` of those with `as_block`.
+3. A run reads `declared_outputs`, unless the ports to record are given, and `every` and
+   `sample_period` of the components with `as_block`.
 4. The run makes one running instance of each component (cosim/run): of a participant in Python
    from its kernels and a copy of its storage (`fresh`), of an FMU from its file. The instance
-   has a memory of its own, so that the component serves any number of runs, one after the
-   other or at the same time.
+   has separate memory, so that one component serves any number of runs, one after the other
+   or at the same time.
 """
 
 from __future__ import annotations
@@ -47,6 +47,6 @@ class Component(Protocol):
     def ports(self, direction: Direction) -> Mapping[str, Port]:
         """Return the ports that can be set ("input") or read ("output", states included), by name.
 
-        Each port is whole (all of its values, no participant). Two names of one port, such as
-        the aliases of FMI 3.0, lead to the same port, which bears one of them.
+        Each port is whole (all of its values, no component). Two names of one port, such as
+        the aliases of FMI 3.0, lead to the same port, which has one of them.
         """

@@ -1,13 +1,13 @@
-"""Which outputs depend on which inputs (feedthrough): read off the source code of the kernels.
+"""Feedthrough: the inputs on which each output depends, read off the source code of the kernels.
 
-A run orders its evaluation by this answer (stage coupling, algebraic cycles): it holds for every
+A run orders its evaluation by this result (stage coupling, algebraic cycles): it holds for every
 value of the parameters, and needs no compilation. The model structure of an exported FMU refines
 it by element, for the parameters as they are: fmus/export/dependencies.py.
 
-The answer is a superset, by variable: assignments are followed without regard to their
+The result is a superset, by variable: assignments are followed without regard to their
 order, a condition counts for everything assigned under it (for everything, where it
-leads to a return, break or continue), a name for an array shares what is written to it,
-and a call writes those arguments that the source of the called function writes. The
+leads to a return, break or continue), all names of an array share its values, and a call
+writes those arguments that the source of the called function writes. The
 outputs of a kernel that cannot be read depend on every input and state.
 """
 
@@ -22,10 +22,9 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
-from .participant import Participant
+from .participant import VECTORS, Participant
 
 _EVALUATION = ("derivatives", "outputs", "step")
-_VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
 
 
 class _Flow(ast.NodeVisitor):
@@ -38,7 +37,7 @@ class _Flow(ast.NodeVisitor):
         self.dimensions = dimensions
         self.conditions: list[set[str]] = []
         self.edges: list[tuple[set[str], set[str]]] = []
-        #: the names on which it depends whether the rest of the function runs
+        #: the names that decide whether the rest of the function runs
         self.jumps: set[str] = set()
         #: names with elements that are written, and names that share memory with each other
         self.stored: set[str] = set()
@@ -102,24 +101,21 @@ class _Flow(ast.NodeVisitor):
         self.stored |= self.names(node.target)
         self.generic_visit(node)
 
-    def visit_NamedExpr(self, node: ast.NamedExpr) -> None:
-        self.assign([node.target], node.value)
-        self.generic_visit(node)
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
+    def _single(self, node: ast.NamedExpr | ast.AnnAssign) -> None:
         if node.value is not None:
             self.assign([node.target], node.value)
         self.generic_visit(node)
+
+    visit_NamedExpr = visit_AnnAssign = _single
 
     def visit_For(self, node: ast.For) -> None:
         self.assign([node.target], node.iter)
         self._under(node.iter, node)
 
-    def visit_While(self, node: ast.While) -> None:
+    def _tested(self, node: ast.While | ast.If) -> None:
         self._under(node.test, node)
 
-    def visit_If(self, node: ast.If) -> None:
-        self._under(node.test, node)
+    visit_While = visit_If = _tested
 
     def _under(self, condition: ast.expr, node: ast.AST) -> None:
         self.conditions.append(self.names(condition))
@@ -152,7 +148,7 @@ class _Flow(ast.NodeVisitor):
             if isinstance(argument, ast.Name) and argument.id == self.self_name:
                 self.opaque = True
         if receiver and self.names(receiver[0]) - self.globals.keys():
-            self.opaque = True  # a method of what a variable holds
+            self.opaque = True  # a method of the value of a variable
         parameters = None if node.keywords else _written(self.called(node.func))
         changed = [a for i, a in enumerate(given) if parameters is None or i in parameters]
         written = set().union(*(self.memory_of(a) for a in changed))
@@ -221,7 +217,7 @@ def dependencies(participant: Participant) -> dict[str, set[str]]:
     wanted = [n for n, kind in kinds.items() if kind in ("output", "derivative")]
     edges: list[tuple[set[str], set[str]]] = []
     dimensions = {f".{n}": len(v.shape) for n, v in participant.variables.items()}
-    dimensions |= {f".{vector}": 1 for vector in _VECTORS}
+    dimensions |= {f".{vector}": 1 for vector in VECTORS}
     for name in _EVALUATION:
         if name in participant.kernels:
             more = _edges(participant.kernels[name], dimensions) if participant.compiled else None
@@ -230,7 +226,7 @@ def dependencies(participant: Participant) -> dict[str, set[str]]:
             edges += more
     reach: dict[str, set[str]] = {f".{n}": {n} if n in sources else set() for n in kinds}
     written, read = (set().union(*(edge[side] for edge in edges)) for side in (0, 1))
-    for vector, kind in _VECTORS.items():
+    for vector, kind in VECTORS.items():
         members = {f".{n}" for n, k in kinds.items() if k == kind}
         edges += [(members, {f".{vector}"})] if f".{vector}" in written else []
         edges += [({f".{vector}"}, members)] if f".{vector}" in read else []

@@ -23,17 +23,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ..arrays import Array
 from ..errors import DeclarationError, did_you_mean
 from .integrators import integrate_ode4, linear_hold
 from .port import Direction, Port
-from .variables import KINDS, Array, Local, Parameter, Variable, whole_number
+from .variables import KINDS, Local, Parameter, Variable
+from .whole_number import whole_number
 
 #: the kernels, and how many of (t, h) each takes
 KERNEL_TIMES = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
-_VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
+VECTORS = {"input_vector": "input", "state_vector": "state", "derivative_vector": "derivative"}
 #: attributes that each instance owns and no copy may share
-_BOUND = {"memory", "variables", "zones", "_views", *_VECTORS}
-_RESERVED = {*_VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
+_BOUND = {"memory", "variables", "zones", "_views", *VECTORS}
+_RESERVED = {*VECTORS, *KERNEL_TIMES, "every", "sample_period", "variables", "memory", "zones"}
 #: names of sizes that a Continuous computes itself
 _AUTOMATIC = {"n_states", "n_inputs_and_one", "n_hold"}
 
@@ -70,6 +72,8 @@ class Participant:
     CACHE_KEYS: ClassVar[tuple[str, ...]] = ()
     #: sizes by name, for those that neither a keyword nor an array gives
     DEFAULT_SIZES: ClassVar[Mapping[str, int]] = {}
+    #: units by name, for those that no keyword gives
+    DEFAULT_UNITS: ClassVar[Mapping[str, str]] = {}
     #: the contract of a component, see component.py
     as_block: bool = False
     every: int | None = None
@@ -127,7 +131,7 @@ class Participant:
 
     def __init__(self, **values: Any) -> None:
         sizes = self._sizes(values)
-        units = {name: values.get(name) for name in self._unit_names}
+        units = {name: values.get(name, self.DEFAULT_UNITS.get(name)) for name in self._unit_names}
         for name, unit in units.items():
             if not isinstance(unit, (str, NoneType)):
                 raise DeclarationError(f"{type(self).__name__}: {name}={unit!r} must be a unit, such as 'N'")
@@ -202,7 +206,7 @@ class Participant:
             zones[kind] = (first, slot - first)
         #: first slot and number of slots of each kind
         self.zones = zones
-        self._bind(np.zeros(slot + 1))  # with a spare slot, which the vector of an empty zone shows
+        self._bind(np.zeros(slot + 1))  # one spare slot, to which the vector of an empty zone refers
 
     def _bind(self, memory: Array) -> None:
         self.memory = memory
@@ -210,7 +214,7 @@ class Participant:
         for name, v in self.variables.items():
             shape = tuple(int(n) for n in v.shape)
             self._views[name] = memory[v.slot : v.slot + v.size].reshape(shape)
-        for name, kind in _VECTORS.items():
+        for name, kind in VECTORS.items():
             first, size = self.zones[kind]
             setattr(self, name, memory[first : first + size] if size else memory[-1:])
 
@@ -219,7 +223,7 @@ class Participant:
         """The storage as a NumPy dtype; the vectors overlap the variables of their zone."""
         fields = {n: (v.slot, v.shape) for n, v in self.variables.items()}
         spare = self.memory.size - 1
-        for name, kind in _VECTORS.items():
+        for name, kind in VECTORS.items():
             first, size = self.zones[kind]
             fields[name] = (first, (size,)) if size else (spare, (1,))
         return np.dtype(

@@ -1,4 +1,4 @@
-"""Ports: the named values that a component of a system reads and gives."""
+"""Ports: the named values that a component of a system reads and provides."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Port:
     """A port of a component, or the part of it that a connection uses.
 
     participant
-        the component's name in its system; "" as long as it is not in one
+        the component's name in its system; "" outside a system
     shape
         of the whole port; strings and binary data are single values, with shape ()
     unit, definition
@@ -26,8 +26,8 @@ class Port:
     relative
         a difference, such as one of temperatures: its unit is converted without an offset
     first, count, index
-        the part: `count` values from number `first` on, in the order of the memory, and how it
-        is written, such as [2:4]
+        the part: `count` values from number `first` on, in the order of the memory, and its
+        notation, such as [2:4]
     """
 
     participant: str

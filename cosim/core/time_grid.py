@@ -22,16 +22,16 @@ def steps_between(period: float, h: float, what: str) -> int:
 
 
 def _whole(ratio: float) -> int | None:
-    """Return the whole number of steps that a ratio means, None if it means none."""
+    """Return the whole number of steps to which a ratio is equal but for round-off, None if none."""
     steps = round(ratio)
-    # room for the round-off of decimal numbers: never more than a millionth of a step, but for
-    # so many steps that the ratio itself is not held as precisely, and then a hundredth
+    # room for the round-off of decimal numbers: at most a millionth of a step, or a hundredth
+    # where the ratio is so large that a float64 does not resolve a millionth
     room = max(min(1e-9 * steps, 1e-6), min(2.0 * math.ulp(ratio), 1e-2))
     return steps if steps >= 1 and abs(ratio - steps) <= room else None
 
 
 def _shown(ratio: float) -> str:
-    """Return a ratio in few digits, but not so few that it looks whole."""
+    """Return a ratio in few digits, but in enough not to look whole."""
     text = f"{ratio:.6g}"
     return text if float(text) % 1.0 else f"{ratio:.14g}"
 

@@ -19,14 +19,12 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from numbers import Real
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array as Array
-from ..errors import DeclarationError
+from ..arrays import Array
 
 Size: TypeAlias = int | str
 Shape: TypeAlias = Size | tuple[Size, ...]
@@ -35,14 +33,6 @@ Kind = Literal["input", "output", "state", "derivative", "local", "parameter"]
 #: the order of the zones in a storage
 KINDS: tuple[Kind, ...] = ("input", "output", "state", "derivative", "local", "parameter")
 _UNIT_NAME = re.compile(r"\$([A-Za-z_]\w*)")
-
-
-def whole_number(what: str, value: Any, least: int = 1) -> int:
-    """Return a whole number that must not be below `least` as an int."""
-    number = float(value) if isinstance(value, Real) else math.nan
-    if not (number.is_integer() and least <= number <= 2.0**53):
-        raise DeclarationError(f"{what}={value!r} must be a whole number, {least} or more")
-    return int(number)
 
 
 @dataclass(frozen=True)
@@ -69,7 +59,7 @@ class Variable:
     @property
     def size(self) -> int:
         """Number of float64 slots."""
-        return int(np.prod([int(n) for n in self.shape], dtype=np.int64)) if self.shape else 1
+        return math.prod(int(n) for n in self.shape)
 
     def __set_name__(self, owner: type, name: str) -> None:
         object.__setattr__(self, "name", name)

@@ -1,6 +1,6 @@
-"""One probe in a process of its own: python -P -m cosim.doctor.child FMU PROBE INTERFACE ANSWER
+"""The process of one probe: python -P -m cosim.doctor.child FMU PROBE INTERFACE ANSWER
 
-ANSWER is a file of lines of JSON: one line before each action, and the verdict as the last line.
+ANSWER is a file with lines of JSON: one line before each action, and the verdict as the last line.
 The output that the FMU prints is not read.
 """
 
@@ -15,7 +15,7 @@ from .examination import PROBES
 
 
 def main(path: str, probe: str, interface: str, answer: str) -> None:
-    """Run a probe, and write its actions and its verdict."""
+    """Run a probe, and write its actions and its verdict to the file `answer`."""
     with open(answer, "w", encoding="utf-8") as out:
 
         def write(**line: str) -> None:

@@ -1,4 +1,4 @@
-"""All probes of an FMU, each in a process of its own."""
+"""The examination of an FMU by all probes, each in a process of its own."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 from ..errors import CosimError, FMUError, did_you_mean
-from ..fmi.file.archive import Archive
 from ..fmi.fmu import FMU
 from . import misuse, probes
 from .report import Finding, Report
 
 _INTERFACES = ("Co-Simulation", "Model Exchange")
 TIME_LIMIT = 60.0  # s of one probe; 1,000 instances of an ordinary FMU take two
+_START_LIMIT = 60.0  # s until Python and the package are loaded, on a busy machine as well
 _FILE = ("",)
 
 
@@ -54,12 +56,14 @@ PROBES = (
 def examine(
     path: str | PathLike[str], *, only: Iterable[str] | None = None, time_limit: float = TIME_LIMIT
 ) -> Report:
-    """Examine an FMU; every fault is reported as a finding, none is raised.
+    """Examine an FMU and return the report; the faults of the FMU are findings, not exceptions.
 
     only
         the names of the probes to run; all by default
     time_limit
-        seconds that a probe may take
+        the time that a probe may take, in s, without the start of its process
+
+    Raises CosimError for an unknown name of a probe.
     """
     path = Path(path)
     wanted = [p.name for p in PROBES] if only is None else list(only)
@@ -68,8 +72,6 @@ def examine(
             raise CosimError(f"probe '{name}' does not exist" + did_you_mean(name, [p.name for p in PROBES]))
     try:
         fmu = FMU(path)
-        with Archive(path) as archive:
-            platforms = archive.platforms()
     except FMUError as error:
         return Report(path.name, "not usable here", (Finding("file", "", "error", str(error)),))
     has = {"": True, "Co-Simulation": fmu.has_cs, "Model Exchange": fmu.has_me}
@@ -81,20 +83,21 @@ def examine(
         found = [
             pool.submit(_probed, path, *job, Path(folder) / str(i), time_limit) for i, job in enumerate(jobs)
         ]
-        findings = [_platforms(platforms), *(f.result() for f in found)]
+        findings = [_platforms(fmu), *(f.result() for f in found)]
     tool = fmu.description.generationTool
     kinds = " and ".join(i for i in _INTERFACES if has[i])
     about = f"FMI {fmu.description.fmiVersion}, {kinds}" + (f", made by {tool}" if tool else "")
     return Report(path.name, about, tuple(findings))
 
 
-def _platforms(platforms: list[str]) -> Finding:
+def _platforms(fmu: FMU) -> Finding:
+    platforms = sorted(folder.name for folder in (fmu.directory / "binaries").iterdir() if folder.is_dir())
     text = f"binaries for {', '.join(platforms)}"
     return Finding("platforms", "", "note" if len(platforms) == 1 else "ok", text)
 
 
 def _probed(path: Path, probe: str, interface: str, folder: Path, time_limit: float) -> Finding:
-    """Run a probe in a process; a crash and a hang are findings."""
+    """Run a probe in a process; a crash or a hang is a finding."""
     folder.mkdir()
     answer, words = folder / "answer", folder / "words"
     package = str(Path(__file__).parents[2])
@@ -110,9 +113,7 @@ def _probed(path: Path, probe: str, interface: str, folder: Path, time_limit: fl
             command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, env=environment, start_new_session=True
         )
         try:
-            code: int | None = process.wait(time_limit)
-        except subprocess.TimeoutExpired:
-            code = None
+            code = _exit_code(process, answer, time_limit)
         finally:
             _end(process)
     lines = [json.loads(line) for line in _complete_lines(answer)]
@@ -127,6 +128,17 @@ def _probed(path: Path, probe: str, interface: str, folder: Path, time_limit: fl
         last = words.read_text(errors="replace").strip().splitlines()[-1:]
         how = f"ended its process with exit code {code}" + "".join(f" ({line[:200]})" for line in last)
     return Finding(probe, interface, "crashed", f"{how}; it was to: {doing}")
+
+
+def _exit_code(process: subprocess.Popen[bytes], answer: Path, time_limit: float) -> int | None:
+    """Return the exit code, or None if the probe does not end in time after its first line."""
+    deadline, has_begun = time.monotonic() + _START_LIMIT, False
+    while time.monotonic() < deadline:
+        with suppress(subprocess.TimeoutExpired):
+            return process.wait(0.02)
+        if not has_begun and _complete_lines(answer):
+            deadline, has_begun = time.monotonic() + time_limit, True
+    return None
 
 
 def _complete_lines(path: Path) -> list[str]:

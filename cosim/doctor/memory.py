@@ -1,4 +1,4 @@
-"""Memory and handles of the process, where the system reports them."""
+"""Memory and open files of this process, where the system reports them."""
 
 from __future__ import annotations
 

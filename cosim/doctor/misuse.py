@@ -1,4 +1,4 @@
-"""Calls that an importer must not make: an FMU should answer them with an error status."""
+"""The probes of misuse: calls that FMI forbids, which an FMU should answer with an error status."""
 
 from __future__ import annotations
 
@@ -22,29 +22,25 @@ def _answered(what: str, call: Callable[[], Any], doing: Doing) -> Verdict:
 
 
 def step_before_initialization(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """doStep right after instantiation."""
+    """A step right after instantiation is refused."""
     doing("instantiate")
     subject = Subject(fmu, model_exchange)
-    plan = subject.plan
     return _answered(
-        "do a step before initialization", lambda: subject.api.doStep(plan.start, plan.step, False), doing
+        "do a step before initialization", lambda: subject.api.doStep(subject.t0, subject.h, False), doing
     )
 
 
 def negative_step(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """A step back in time."""
-    subject = Subject(fmu, model_exchange)
-    subject.start()
+    """A step back in time is refused."""
+    subject = Subject(fmu, model_exchange).start()
     subject.run(3)
-    h = subject.plan.step
-    back = subject.plan.start + 3 * h
-    return _answered(f"do a step of {-h:g} s", lambda: subject.api.doStep(back, -h, False), doing)
+    h, now = subject.h, subject.t0 + 3 * subject.h
+    return _answered(f"do a step of {-h:g} s", lambda: subject.api.doStep(now, -h, False), doing)
 
 
 def unknown_reference(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Get a variable that does not exist."""
-    subject = Subject(fmu, model_exchange)
-    subject.start()
+    """Getting a variable that does not exist is refused."""
+    subject = Subject(fmu, model_exchange).start()
     known = {v.valueReference for v in fmu.variables.values()}
     reference = next(r for r in count(3_000_000_000) if r not in known)
     access = "Real" if fmu.description.fmiVersion == "2.0" else "Float64"

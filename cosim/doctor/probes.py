@@ -1,8 +1,9 @@
-"""The probes: each examines one property of an FMU, and reports its finding.
+"""The probes: each examines one property of an FMU and reports its finding.
 
 A probe takes the FMU, whether to use Model Exchange, and `doing`, which it calls with a text before
 every action, so that the last action is known if the FMU ends the process. It returns a level
-(report.LEVELS) and a text. The probes of misuse are in misuse.py.
+(report.LEVELS) and a text. The first line of its docstring states the sound behaviour. The probes
+of misuse are in misuse.py.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 
 from ..errors import CosimError, WiringError
 from ..fmi.fmu import FMU
-from ..fmi.ports import FMUPort, unit_definitions, unit_of
+from ..fmi.ports import unit_definitions
+from ..loop.instance import buffer
 from ..units import parse
 from .memory import handles, memory
 from .subject import STEPS, Subject, Values, difference, same
@@ -24,17 +26,17 @@ Doing: TypeAlias = Callable[[str], None]
 Probe: TypeAlias = Callable[[FMU, bool, Doing], Verdict]
 
 INSTANCES = 1000
-#: bytes of growth per instance: below SMALL it is noise; above LARGE a campaign runs out of memory
+#: bytes of growth per instance: below SMALL it is noise, above LARGE a campaign runs out of memory
 SMALL, LARGE = 1024, 102_400
 #: difference between two step sizes, as a part of the range of an output
 ROUNDING, COARSE = 1e-6, 0.1
-#: rounding that is left where two terms in an input cancel, as a part of the values of an output
+#: rounding that remains where two terms of an input cancel, as a part of the values of an output
 CANCELLED = 1e-10
-_NAMED = 4  # number of ports that a line names
+_NAMED = 4  # number of ports that one line names
 
 
 def named(names: list[str]) -> str:
-    """Return the first of some names as a text."""
+    """Return the first few names as a text, and the number of the others."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more
 
@@ -43,7 +45,7 @@ def named(names: list[str]) -> str:
 
 
 def validity(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """FMPy's validation: schema, names, model structure, start values, units."""
+    """The file passes FMPy's validation of schema, names, model structure, start values and units."""
     from fmpy.validation import validate_fmu
 
     doing("validate")
@@ -55,11 +57,12 @@ def validity(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Inputs and outputs that are real numbers have units that can be converted."""
+    """Real inputs and outputs have units that can be converted."""
     doing("read the units")
-    kinds = {n: p for n, p in {**fmu.input_ports, **fmu.output_ports}.items() if _is_real(fmu, p)}
-    ends = {n: p for n, p in kinds.items() if p.variables[0].causality in ("input", "output")}
-    without = [n for n, p in ends.items() if unit_of(p.variables[0]) is None]
+    ports = {**fmu.input_ports, **fmu.output_ports}
+    reals = {n: p for n, p in ports.items() if fmu.version.numbers[p.type][1].is_float}
+    ends = {n: p for n, p in reals.items() if p.variables[0].causality in ("input", "output")}
+    without = [n for n, p in ends.items() if p.unit is None]
     unknown = set()
     for unit in {p.unit for p in ends.values()} - {None} - unit_definitions(fmu.description).keys():
         try:
@@ -72,10 +75,6 @@ def units(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     if unknown:
         parts.append(f"not known, so not converted: {named(sorted(unknown))}")
     return ("note", "; ".join(parts)) if parts else ("ok", f"{len(ends)} inputs and outputs have one")
-
-
-def _is_real(fmu: FMU, port: FMUPort) -> bool:
-    return fmu.version.numbers[port.type][1].is_float
 
 
 # ------------------------------------------------------------------------- its instances
@@ -97,12 +96,12 @@ def instance(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     subject.run(3)
     doing("terminate and free the instance")
     subject.stop()
-    h = subject.plan.step
-    return "ok", f"loads, initializes, does 3 steps{'' if model_exchange else f' of {h:g} s'}, ends"
+    length = "" if model_exchange else f" of {subject.h:g} s"
+    return "ok", f"loads, initializes, does 3 steps{length}, ends"
 
 
 def initial_values(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """After initialization outputs, derivatives and event indicators are finite."""
+    """After initialization, outputs, derivatives and event indicators are finite."""
     doing("initialize")
     subject = Subject(fmu, model_exchange)
     subject.start()
@@ -111,12 +110,13 @@ def initial_values(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     text = f"{sum(v.size for v in values.values())} output values finite"
     if model_exchange:
         model = subject.model
-        slopes, indicators = np.zeros(max(model.n_states, 1)), np.zeros(max(model.n_indicators, 1))
+        slopes, states, indicators = (buffer(n) for n in (model.n_states, model.n_states, model.n_indicators))
         doing("get derivatives and event indicators")
         if model.n_states:
             model.get_derivatives(slopes.ctypes.data)
         model.get_indicators(indicators.ctypes.data)
-        values |= {"derivatives": slopes, "event indicators": indicators, "states": subject.states()}
+        model.get_states(states.ctypes.data)
+        values |= {"derivatives": slopes, "event indicators": indicators, "states": states}
         text += f", {model.n_states} derivatives and {model.n_indicators} event indicators"
     bad = [n for n, v in values.items() if not np.isfinite(v.astype(float)).all()]
     subject.stop()
@@ -124,7 +124,7 @@ def initial_values(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """After reset a run is the same, bit for bit; if it is not, a new instance is compared as well."""
+    """After reset, a run is the same bit for bit; if it is not, a new instance is compared as well."""
     subject = Subject(fmu, model_exchange)
     doing("initialize")
     subject.start()
@@ -132,7 +132,8 @@ def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     doing(f"do {STEPS} steps")
     first = [start, *subject.run()]
     doing("reset")
-    subject.reset()
+    subject.driver.attempt("reset", subject.api.reset)
+    subject.start()
     kept = [n for n, v in inputs.items() if not same(v, subject.start_inputs[n])]
     subject.set({n: inputs[n] for n in kept})
     subject.start_inputs = inputs
@@ -149,20 +150,18 @@ def reset(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return "error", f"the run after reset differs: {changed}"
     doing("repeat the run in a new instance")
-    other = Subject(fmu, model_exchange)
-    other.start()
+    other = Subject(fmu, model_exchange).start()
     fresh = difference((first, [other.read(), *other.run()]), 0)
     how = "a new instance differs, too" if fresh else "a new instance repeats it"
     return "error", f"the run after reset differs: {changed}; {how}"
 
 
 def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """A saved state repeats the run when it is set; also from bytes and in another instance."""
+    """A saved state repeats the run when it is set, also from bytes and in another instance."""
     interface = _interface(fmu, model_exchange)
     if not interface.canGetAndSetFMUstate:
         return "note", "not declared: it cannot be saved and returned to"
-    subject = Subject(fmu, model_exchange)
-    subject.start()
+    subject = Subject(fmu, model_exchange).start()
     half = STEPS // 4  # the inputs change later, so that they have to be restored as well
     subject.run(half)
     doing("get the state")
@@ -179,15 +178,14 @@ def state(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
         subject.stop()
         return "ok", f"repeats {STEPS} steps bit for bit; not as bytes (not declared)"
     doing("serialise the state")
-    data = subject.driver.attempt("serialise its state", lambda: subject.api.serializeFMUState(saved[0]))
+    data = subject.driver.attempt("serialise its state", subject.api.serializeFMUState, saved[0])
     doing("free the state")
     subject.forget(saved)
     if not interface.canBeInstantiatedOnlyOncePerProcess:
         doing("instantiate another one")
-        subject = Subject(fmu, model_exchange, "another")
-        subject.start()
+        subject = Subject(fmu, model_exchange, "another").start()
     doing("deserialise the state")
-    read = subject.driver.attempt("read its state", lambda: subject.api.deserializeFMUState(data)), saved[1]
+    read = subject.driver.attempt("read its state", subject.api.deserializeFMUState, data), saved[1]
     doing("set the deserialised state")
     subject.restore(read)
     third = [subject.read(), *subject.run(STEPS, half)]
@@ -203,15 +201,14 @@ def leak(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return ONCE
     warm = INSTANCES // 5
-    subject = Subject(fmu, model_exchange)
-    subject.start()
+    subject = Subject(fmu, model_exchange).start()
     before = (0, 0)
     for i in range(INSTANCES):
         doing(f"make instance {i + 1} of {INSTANCES}")
         if i > 0:
-            subject.again()
+            subject.driver.make()
             subject.start()
-        subject.step(subject.plan.start, subject.plan.step)
+        subject.step(subject.t0, subject.h)
         subject.stop()
         if i + 1 == warm:
             before = memory(), handles()
@@ -226,24 +223,21 @@ def leak(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def several(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """The run of an instance is the same while another one runs in turn with other inputs."""
+    """The run of an instance is the same while another one runs in alternation with other inputs."""
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return ONCE
     doing("run one instance")
-    alone = Subject(fmu, model_exchange, "alone")
-    alone.start()
+    alone = Subject(fmu, model_exchange, "alone").start()
     first = [alone.read(), *alone.run()]
     alone.stop()
     doing("make two instances")
     one, other = (Subject(fmu, model_exchange, name) for name in ("one", "other"))
-    one.start()
-    start = one.read()
+    second = [one.start().read()]
     other.start()
-    second = [start]
     for k in range(STEPS):
         doing(f"do step {k + 1} of two instances")
         other.set(other.excited(0.3 + 0.1 * k))
-        other.step(other.plan.start + k * other.plan.step, other.plan.step)
+        other.step(other.t0 + k * other.h, other.h)
         second += one.run(1, k)
     doing("free one of two instances")
     other.stop()
@@ -258,7 +252,7 @@ def several(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
 
 
 def feedthrough(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Every input is changed without a step: the outputs that change at once are declared."""
+    """The outputs that change at once when an input is changed without a step are declared."""
     subject = Subject(fmu, model_exchange)
     if not subject.inputs:
         return "ok", "no continuous inputs"
@@ -294,7 +288,7 @@ def _changed(before: Values, after: Values) -> list[str]:
 
 
 def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict:
-    """Compare the observed dependencies with those that the model structure declares."""
+    """Return the verdict on the observed dependencies, given those that the model structure declares."""
     declared = fmu.feedthrough()
     numeric = [u for u in fmu.description.outputs if u.variable.type in fmu.version.numbers]
     listed = {fmu.key(u.variable) for u in numeric if u.dependencies is not None}  # aliases share it
@@ -316,20 +310,20 @@ def _judged(fmu: FMU, subject: Subject, seen: Mapping[str, set[str]]) -> Verdict
 
 
 def step_size(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
-    """Compare runs with h and with h / 2, with held inputs, at the points that both have."""
+    """A run with h / 2 and held inputs agrees with that with h at their common points."""
     if _interface(fmu, model_exchange).canBeInstantiatedOnlyOncePerProcess:
         return ONCE
     runs: list[list[Values]] = []
     for parts in (1, 2):
         subject = Subject(fmu, model_exchange, f"step{parts}")
-        h = subject.plan.step / parts
+        h = subject.h / parts
         doing(f"do steps of {h:g} s")
         subject.start()
         subject.set(subject.excited(0.1))
         try:
             runs.append([subject.read()])
             for k in range(2 * STEPS * parts):
-                subject.step(subject.plan.start + k * h, h)
+                subject.step(subject.t0 + k * h, h)
                 runs[-1].append(subject.read())
         except CosimError:
             if parts == 2 and not fmu.description.coSimulation.canHandleVariableCommunicationStepSize:
@@ -347,7 +341,5 @@ def step_size(fmu: FMU, model_exchange: bool, doing: Doing) -> Verdict:
     name, most = max(relative.items(), key=lambda item: item[1])
     varies = fmu.description.coSimulation.canHandleVariableCommunicationStepSize
     level = "ok" if most <= ROUNDING else "note" if most <= COARSE or not varies else "warning"
-    h = subject.plan.step
-    return level, f"with h / 2 the run differs by {most:.2g} of its range ({name}, h = {h:g} s)" + (
-        "" if varies else "; a variable step is not declared"
-    )
+    text = f"with h / 2 the run differs by {most:.2g} of its range ({name}, h = {subject.h:g} s)"
+    return level, text + ("" if varies else "; a variable step is not declared")

@@ -1,4 +1,4 @@
-"""The findings of the probes, as text and as data."""
+"""The report of an examination: the findings of the probes, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -7,18 +7,13 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
-#: levels from good to bad, and the exit code of a report with this worst finding
+#: levels from good to bad; the exit code of a report whose worst finding has the level
 LEVELS: Mapping[str, int] = {"ok": 0, "note": 0, "warning": 1, "error": 2, "crashed": 3}
-
-
-def worst(levels: list[str]) -> str:
-    """Return the worst of some levels."""
-    return max(levels, key=list(LEVELS).index, default="ok")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The finding of one probe: a line of the report."""
+    """The finding of one probe, which is one line of the report."""
 
     probe: str
     #: "Co-Simulation", "Model Exchange", or "" for a property of the file
@@ -39,7 +34,7 @@ class Report:
     @property
     def worst(self) -> str:
         """The level of the worst finding."""
-        return worst([f.level for f in self.findings])
+        return max((f.level for f in self.findings), key=list(LEVELS).index)
 
     @property
     def exit_code(self) -> int:

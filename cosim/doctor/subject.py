@@ -1,10 +1,9 @@
-"""An FMU under examination: one instance, moved call by call, without the loop."""
+"""An FMU under examination: one instance that is driven call by call, without the loop."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ..fmi.instance.event_steps import EventSteps, RungeKutta
 from ..fmi.ports import FMUPort
 from ..loop.signals import RunSignals
 
-#: values of ports by name, as the FMU gives them
+#: values of ports by name, in the FMU's units
 Values: TypeAlias = dict[str, np.ndarray[Any, Any]]
 
 STEPS = 20  # of a run that is repeated: two input changes and their effects
@@ -24,33 +23,26 @@ _EULER = 0.1  # step of Euler's method, for Model Exchange, as a part of the com
 _MOST_PORTS = 500  # number of ports that are watched; more would not find more faults
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Start time and communication step, in s."""
-
-    start: float
-    step: float
-
-
-def plan_of(fmu: FMU) -> Plan:
-    """Return the default experiment: its step, or a 500th of its time, or 10 ms."""
+def times_of(fmu: FMU) -> tuple[float, float]:
+    """Return start time and step of the default experiment, in s: its step, a 500th of it, or 10 ms."""
     experiment = fmu.description.defaultExperiment
     start, stop, step = (
         float(getattr(experiment, name, None) or 0.0) for name in ("startTime", "stopTime", "stepSize")
     )
     if step <= 0.0:
         step = (stop - start) / 500 if stop > start else 0.01
-    return Plan(start, step)
+    return start, step
 
 
 class Subject:
-    """An instance of an FMU; its functions raise CosimErrors with the FMU's own log."""
+    """An instance of an FMU; its methods raise a CosimError with the FMU's log."""
 
     def __init__(self, fmu: FMU, model_exchange: bool, name: str = "instance") -> None:
         self.fmu = fmu
-        self.plan = plan_of(fmu)
+        #: start time and communication step, in s
+        self.t0, self.h = times_of(fmu)
         self.model_exchange = model_exchange
-        self.driver = load(fmu, name, model_exchange, RunSignals(), fmu.event_mode and not model_exchange)
+        self.driver = load(fmu, name, model_exchange, RunSignals(), fmu.event_mode)
         self.api = self.driver.api
         outputs = {n: fmu.output_ports[n] for n in fmu.declared_outputs} or fmu.output_ports
         self.outputs = dict(list(outputs.items())[:_MOST_PORTS])
@@ -60,47 +52,35 @@ class Subject:
 
     # ----------------------------------------------------------------------------- life
 
-    def start(self) -> None:
-        """Take the instance through initialization, with the start values of the description."""
-        self.driver.initialize(self.plan.start, lambda: None)
-        if self.model_exchange or self.driver.event_mode:
-            self._discrete_states(self.plan.start)
+    def start(self) -> Self:
+        """Initialize the instance with the start values of the description, and return it."""
+        self.driver.initialize(self.t0, lambda: None)
+        if self.driver.event_mode:
+            self._discrete_states(self.t0)
         if self.model_exchange:
             self.model = ContinuousTime(self.driver, *self.driver.counts())
-            self.model.t = self.plan.start
+            self.model.t = self.t0
             self.steps = EventSteps(self.model, RungeKutta(self.model, "ode1", 1), self._completed, self)
         self.start_inputs = self.get(self.inputs)
-
-    def reset(self) -> None:
-        """Reset the instance, and initialize it again."""
-        self.driver.attempt("reset", self.api.reset)
-        self.start()
-
-    def again(self) -> None:
-        """Make another instance in the place of one that was freed."""
-        self.driver.make()
+        return self
 
     def stop(self) -> None:
-        """Terminate and free the instance; the library stays."""
+        """Terminate and free the instance; its library stays loaded, so that `driver.make` can follow."""
         self.driver.attempt("terminate", self.api.terminate)
-        self.free()
-
-    def free(self) -> None:
-        """Free the instance; the library itself stays loaded."""
         getattr(self.api, f"{self.fmu.version.prefix}FreeInstance")(self.api.component)
 
     # --------------------------------------------------------------------------- values
 
     def get(self, ports: Mapping[str, FMUPort]) -> Values:
-        """Get the values of ports, a call for every type."""
+        """Get the values of ports, with one call per type."""
         groups: dict[str, list[tuple[str, FMUPort]]] = {}
         for name, port in ports.items():
             groups.setdefault(self.fmu.version.numbers[port.type][0], []).append((name, port))
         found: Values = {}
-        for access, members in groups.items():
-            references = [v.valueReference for _, p in members for v in p.variables]
-            values = np.array(self.driver.get(access, references, sum(p.size for _, p in members)))
-            for name, port in members:
+        for access, group in groups.items():
+            references = [v.valueReference for _, p in group for v in p.variables]
+            values = np.array(self.driver.get(access, references, sum(p.size for _, p in group)))
+            for name, port in group:
                 found[name], values = values[: port.size], values[port.size :]
         return found
 
@@ -133,21 +113,19 @@ class Subject:
 
     # ----------------------------------------------------------------------------- time
 
-    def run(self, n: int = STEPS, first: int = 0, step: float | None = None) -> list[Values]:
-        """Do n steps from number `first`, with inputs that change at 0 and 10; return the outputs."""
-        h = self.plan.step if step is None else step
+    def run(self, n: int = STEPS, first: int = 0) -> list[Values]:
+        """Do n steps from step `first` on; the inputs change at steps 0 and 10. Return the outputs."""
         found = []
         for k in range(first, first + n):
             if k in (0, STEPS // 2):
                 self.set(self.excited(0.1 if k == 0 else -0.05))
-            self.step(self.plan.start + k * h, h)
+            self.step(self.t0 + k * self.h, self.h)
             found.append(self.read())
         return found
 
     def step(self, t: float, h: float) -> None:
-        """Do a step: doStep until its end, or a short one of Euler's method, with an event after it."""
-        if self.model_exchange:
-            # at times of the model's own: `run` counts whole communication steps
+        """Do a step from t over h, in s; with Model Exchange, a short one by Euler's method and an event."""
+        if self.model_exchange:  # from the model's own time, which lags behind t
             self.steps.carry(self.model.t, _EULER * h)
         else:
             self.driver.do_step(t, h)
@@ -166,10 +144,6 @@ class Subject:
         """Refuse to end the run."""
         raise FMUError(f"it asks to end the simulation at t = {t:g} s")
 
-    def is_interrupted(self) -> bool:
-        """Return False: Ctrl-C ends the process."""
-        return False
-
     def _discrete_states(self, t: float) -> None:
         if self.driver.update_discrete_states(t):
             raise FMUError("it asks to end the simulation in an event")
@@ -177,37 +151,29 @@ class Subject:
 
     # ---------------------------------------------------------------------------- state
 
-    def states(self) -> np.ndarray[Any, Any]:
-        """Return the continuous states of Model Exchange."""
-        states = np.zeros(self.model.n_states)
-        self.model.get_states(states.ctypes.data)
-        return states
-
     def save(self) -> tuple[Any, float]:
         """Get the FMU's state, and the time of Model Exchange, which the importer keeps."""
-        return self.driver.attempt("get its state", self.api.getFMUState), self._time()
+        time = self.model.t if self.model_exchange else 0.0
+        return self.driver.attempt("get its state", self.api.getFMUState), time
 
     def restore(self, saved: tuple[Any, float]) -> None:
         """Set the FMU's state."""
-        self.driver.attempt("set its state", lambda: self.api.setFMUState(saved[0]))
+        self.driver.attempt("set its state", self.api.setFMUState, saved[0])
         if self.model_exchange:
             self.model.set_time(saved[1])
 
     def forget(self, saved: tuple[Any, float]) -> None:
         """Free a state."""
-        self.driver.attempt("free its state", lambda: self.api.freeFMUState(saved[0]))
-
-    def _time(self) -> float:
-        return self.model.t if self.model_exchange else 0.0
+        self.driver.attempt("free its state", self.api.freeFMUState, saved[0])
 
 
 def same(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> bool:
-    """Return whether two values are the same, bit for bit except for the kinds of NaN and of zero."""
+    """Return whether two values are equal bit for bit, apart from the sign of zero and the kind of NaN."""
     return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
 
 
 def difference(runs: tuple[list[Values], list[Values]], first: int = 1) -> str:
-    """Return where two runs first differ, in words, or "" if they do not."""
+    """Return as text where two runs first differ, or "" if they do not."""
     for k, (a, b) in enumerate(zip(*runs, strict=True)):
         for name in a:
             if not same(a[name], b[name]):

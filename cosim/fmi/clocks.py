@@ -1,9 +1,9 @@
 """Clocks of FMI 3.0 under Co-Simulation.
 
-An output clock is a port that reads 1 at a communication point if it has ticked since
+An output clock is a port whose value at a communication point is 1 if the clock has ticked since
 the last one, and 0 otherwise. A triggered input clock is a port that ticks at the
-communication points at which its value is not 0. An input clock with an interval ticks
-without being a port (instance/timers.py).
+communication points at which its value is not 0. An input clock with an interval is not a port
+(instance/timers.py).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _GIVEN = ("fixed", "tunable")  # intervals that the importer may set
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock; `interval` and `shift` in s from the model description, None where it states none."""
+    """A clock; `interval` and `shift` in s are those of the model description, or None and 0."""
 
     name: str
     reference: int
@@ -30,12 +30,15 @@ class Clock:
 
     @property
     def is_port(self) -> bool:
-        """Return whether it ticks the system, or is ticked by it."""
+        """Whether it is connected in a system: it ticks, or is ticked, at communication points."""
         return self.is_output or self.variability == "triggered"
 
 
 def clocks_of(where: str, variables: Iterable[Any], start: Mapping[str, Any]) -> dict[str, Clock]:
-    """Return the clocks among FMPy's variables; refuse those that are not supported."""
+    """Return the clocks among FMPy's variables, by name.
+
+    Raises FMUError for a clock that is not supported, and for an interval in `start` that it does not take.
+    """
     found: dict[str, Clock] = {}
     for v in variables:
         if v.type != "Clock":
@@ -48,19 +51,19 @@ def clocks_of(where: str, variables: Iterable[Any], start: Mapping[str, Any]) ->
             raise FMUError(f"{name} is an array, and arrays of clocks are not supported")
         if clock.variability in ("changing", "countdown") and not clock.is_output:
             raise FMUError(
-                f"{name} has a {clock.variability} interval, which is not supported: intervals are constant, "
-                "fixed or tunable, or the clock is triggered"
+                f"{name} has a {clock.variability} interval, which is not supported; intervals must be "
+                "constant, fixed or tunable, or the clock triggered"
             )
         if clock.variability == "constant" and clock.interval is None:
             raise FMUError(f"{name} has a constant interval, which the model description must state")
         if v.name in start and (clock.is_output or clock.variability not in _GIVEN):
-            raise FMUError(f"{name} takes no interval (it is {clock.variability}); take it out of start")
+            raise FMUError(f"{name} takes no interval (it is {clock.variability}); remove it from start")
         found[v.name] = clock
     return found
 
 
 def interval_of(variable: Any) -> tuple[float | None, float]:
-    """Return interval and shift of a clock, in s, from the model description."""
+    """Return the interval and the shift of a clock in s, from the model description."""
     v = variable
     interval = _seconds(v.intervalCounter, v.resolution, v.intervalDecimal)
     return interval, _seconds(v.shiftCounter, v.resolution, v.shiftDecimal) or 0.0

@@ -2,8 +2,8 @@
 
     plant = FMU("plant.fmu", start={"m": 2.0})
 
-fmu_file.py reads the file, interfaces.py has the options of the interfaces, versions.py the
-differences between the versions of FMI, and the folder instance the running FMU.
+fmu_file.py reads the file, interfaces.py holds the options of the interfaces, versions.py holds the
+differences between the versions of FMI, and the folder instance holds the running FMU.
 """
 
 from __future__ import annotations
@@ -18,31 +18,34 @@ from ..errors import FMUError, WiringError
 from ..loop.instance import Setting
 from .fmu_file import FMUFile
 from .instance.co_simulation import CoSimulationInstance
+from .instance.drivers import load
 from .instance.model_exchange import ModelExchangeInstance
 from .interfaces import CoSimulation, Interface, InterfaceName, ModelExchange, interface_of
 
 
 class FMU(FMUFile):
-    """An FMU on disk, the values it starts with, and its place in a run.
+    """An FMU as a component of a system: its file, its start values, and its use in a run.
 
     path
         the .fmu file
     start
-        values of parameters, inputs or start values by variable name: numbers in the unit of
-        the variable, or text with another unit, "2 kN/m"; structural parameters (FMI 3.0)
-        change the shapes of the arrays that they size; of a clock, its interval in s
+        start values of parameters and variables by name: numbers in the unit of the variable, or
+        texts with another unit, such as "2 kN/m"; for a clock, its interval in s. Structural
+        parameters (FMI 3.0) change the shapes of the arrays that they size
     interface
         CoSimulation(...) or ModelExchange(...) with their options, or "CoSimulation" or
-        "ModelExchange" without; None uses Co-Simulation if the FMU has it, and Model Exchange
-        under stage coupling
+        "ModelExchange" without options; None uses Co-Simulation if the FMU has it, and Model
+        Exchange under stage coupling
     as_block
-        acts as a Block does, at communication points in the order of the connections: set
-        inputs, doStep from t_k, get outputs at t_k; an exported Block needs it
+        whether the FMU acts as a Block does, at communication points in the order of the
+        connections: set inputs, doStep from t_k, get outputs at t_k; an exported Block needs it
     every, sample_period
-        of a block: acts at every n-th communication point only, as a Block does
+        for a block: it acts at every n-th communication point, or once per period in s
     isolated
-        every instance runs in a process of its own (isolation): a crash in the FMU's code raises
-        SimulationError with the results until then; it costs a few microseconds a step
+        whether every instance runs in a process of its own (isolation): a crash in the FMU's code
+        then raises SimulationError with the results until then; it costs a few microseconds per step
+
+    Raises FMUError if the file, a start value or an option is not valid or not supported.
     """
 
     def __init__(
@@ -57,12 +60,12 @@ class FMU(FMUFile):
         isolated: bool = False,
     ) -> None:
         super().__init__(path, start)
-        #: the participant that was exported to this file, where that is known
+        #: the participant that was exported to this file, if it is known
         self.source: Participant | None = None
-        #: an object that must live as long as the file does, such as its temporary folder
+        #: an object that must live as long as the file, such as its temporary folder
         self.kept: object = None
         name = self.path.name
-        #: the interface that was given, with its options, or None
+        #: the given interface with its options, or None
         self.interface: Interface | None = (
             interface
             if isinstance(interface, (CoSimulation, ModelExchange))
@@ -83,7 +86,7 @@ class FMU(FMUFile):
 
     @property
     def integration(self) -> ModelExchange:
-        """The options of Model Exchange, with the solver that sampled coupling uses."""
+        """The options of Model Exchange, which name the solver of sampled coupling."""
         options = self.interface if isinstance(self.interface, ModelExchange) else ModelExchange()
         return options.resolved(bool(self.description.numberOfEventIndicators))
 
@@ -103,8 +106,8 @@ class FMU(FMUFile):
             raise FMUError(f"{name}: interface={asked} is not available, the FMU has {other} only")
         if self.clocks and self.model_exchange:
             raise FMUError(
-                f"{name} has clocks, which are supported with Co-Simulation, and Model Exchange is "
-                "used" + ("; leave interface= away" if self.has_cs else "; export it with Co-Simulation")
+                f"{name} has clocks, which are supported with Co-Simulation only, and Model Exchange is "
+                "used; " + ("omit interface=" if self.has_cs else "export it with Co-Simulation")
             )
         try:
             _ = self.integration
@@ -127,7 +130,7 @@ class FMU(FMUFile):
         if not self.description.coSimulation.hasEventMode:
             raise FMUError(
                 f"{self.path.name} has no event mode in Co-Simulation, which "
-                + (f"its clock {clock} needs" if clock else "event_mode=True requires; leave it away")
+                + (f"its clock {clock} needs" if clock else "event_mode=True requires; omit that option")
             )
         if asked is False:
             raise FMUError(f"{self.path.name}: event_mode=False, but its clock {clock} needs event mode")
@@ -136,19 +139,20 @@ class FMU(FMUFile):
     # ----------------------------------------------------------------------- instances
 
     def instance(self, name: str, setting: Setting) -> CoSimulationInstance | ModelExchangeInstance:
-        """Return a running instance (cosim/loop/instance.py).
+        """Return a new instance for a run (cosim/loop/instance.py).
 
-        Raises WiringError if the FMU cannot serve stage coupling.
+        Raises WiringError if the FMU cannot take part in stage coupling.
         """
         if setting.is_stage:
             self.check_stage(name)
-        used, signals = set(setting.used), setting.signals
-        if self.model_exchange or (setting.is_stage and not self.as_block):
-            return ModelExchangeInstance(name, self, signals, used, self.integration, self.isolated)
-        return CoSimulationInstance(name, self, signals, used, setting.step, self.event_mode, self.isolated)
+        exchange = self.model_exchange or (setting.is_stage and not self.as_block)
+        driver = load(self, name, exchange, setting.signals, self.event_mode, self.isolated)
+        if exchange:
+            return ModelExchangeInstance(driver, setting.used, self.integration)
+        return CoSimulationInstance(driver, setting.used, setting.step)
 
     def check_stage(self, name: str) -> None:
-        """Raise WiringError with the reason if the FMU cannot serve stage coupling."""
+        """Raise WiringError with the reason if the FMU cannot take part in stage coupling."""
         where, remedy = f"{name} ({self.path.name})", 'use coupling="sampled"'
         if self.as_block:
             if (self.every, self.sample_period) == (None, None):
@@ -169,13 +173,13 @@ class FMU(FMUFile):
             )
         if isinstance(self.interface, CoSimulation):
             raise WiringError(
-                f"{where} is given interface=CoSimulation, and stage coupling needs Model Exchange; "
-                f"leave interface away, or {remedy}"
+                f"{where} has interface=CoSimulation, and stage coupling needs Model Exchange; "
+                f"omit interface=, or {remedy}"
             )
         if self.interface is not None and self.interface != ModelExchange():
             raise WiringError(
-                f"{where} has a solver of its own, and stage coupling integrates all participants "
-                f"together, by simulate(solver=); leave the options of ModelExchange away, or {remedy}"
+                f"{where} has its own solver options, and stage coupling integrates all components "
+                f"together, by simulate(solver=); omit the options of ModelExchange, or {remedy}"
             )
 
     def __repr__(self) -> str:

@@ -1,7 +1,7 @@
-"""An FMU as read from its file: its description, its variables as ports, and the start values given.
+"""An FMU as read from its file: its description, its variables as ports, and its start values.
 
-Arrays are ports with a shape (ports.py). Variables of all numeric types are ports, floats
-to the system; so are clocks (clocks.py), strings and binary data.
+Arrays are ports with a shape (ports.py). Variables of all numeric types are ports, whose values
+are floats in a system; so are clocks (clocks.py). Strings and binary data are ports as well.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from .file.archive import Archive
 from .file.display_units import without_units
 from .file.model_description import description_of
 from .file.shared_library import library_name
-from .ports import FMUPort, Shape, ports, shape_of, single, unit_definitions
+from .ports import FMUPort, Shape, port_of, ports, shape_of, unit_definitions
 from .versions import version_of
 
 
 class FMUFile:
-    """An .fmu file that is unpacked, and the values that an instance starts with."""
+    """An .fmu file that is unpacked, and the start values of an instance.
+
+    Raises FMUError if the file, or a start value, is not valid or not supported.
+    """
 
     def __init__(self, path: str | PathLike[str], start: Mapping[str, Any] | None) -> None:
         if not isinstance(path, (str, PathLike)):
@@ -50,7 +53,7 @@ class FMUFile:
         self._take_start(start or {})
 
     def _take_start(self, start: Mapping[str, Any]) -> None:
-        """Take start values, which may change the shapes of ports; refuse those that do not fit."""
+        """Take over start values, which may change the shapes of ports; refuse those that do not fit."""
         self.start = dict(start)
         #: the clocks of FMI 3.0
         self.clocks = clocks_of(self.path.name, self.variables.values(), self.start)
@@ -59,21 +62,21 @@ class FMUFile:
         texts = [v for v in self.variables.values() if v.type in ("String", "Binary")]
         self.output_ports = self._ports(v for v in numeric if v.causality in ("output", "local"))
         self.input_ports = self._ports(v for v in numeric if v.causality == "input" and v.alias is None)
-        self.text_inputs = {v.name: v for v in texts if v.causality == "input" and v.alias is None}
-        self.text_outputs = {v.name: v for v in texts if v.causality in ("output", "local")}
-        self.inputs = self._as_ports(self.input_ports, self.text_inputs)
-        self.outputs = self._as_ports(self.output_ports, self.text_outputs)
+        self.text_inputs = self._texts(v for v in texts if v.causality == "input" and v.alias is None)
+        self.text_outputs = self._texts(v for v in texts if v.causality in ("output", "local"))
+        self.inputs: dict[str, Port] = {**self.input_ports, **self.text_inputs}
+        self.outputs: dict[str, Port] = {**self.output_ports, **self.text_outputs}
         for v in self.variables.values():  # other names of inputs (FMI 3.0)
             if v.causality == "input" and v.alias is not None and v.alias.name in self.inputs:
                 self.inputs[v.name] = self.inputs[v.alias.name]
-        #: the names of the outputs proper, without local variables
+        #: the names of the outputs, without the local variables
         self.declared_outputs = [
             n for n, p in self.output_ports.items() if p.variables[0].causality == "output"
         ]
         self._start_values = self._checked_start_values()
 
     def start_values(self) -> dict[str, list[Any]]:
-        """Return the start values that were given, by variable and in its unit, as FMPy takes them."""
+        """Return the given start values by variable, as lists in its unit, as FMPy takes them."""
         return self._start_values
 
     def ports(self, direction: Direction) -> dict[str, Port]:
@@ -103,17 +106,15 @@ class FMUFile:
             )
 
     def shape_of(self, variable: Any) -> Shape:
-        """Return the shape of a variable, with the structural parameters that were given."""
+        """Return the shape of a variable, which structural parameters in `start` may change."""
         return shape_of(variable, self.start)
 
     def _ports(self, variables: Iterable[Any]) -> dict[str, FMUPort]:
-        found = ports(variables, self.shape_of)
+        found = ports(variables, self.shape_of, unit_definitions(self.description))
         return {name: port for name, port in found.items() if port.size > 0}
 
-    def _as_ports(self, numeric: Mapping[str, FMUPort], texts: Mapping[str, Any]) -> dict[str, Port]:
-        definitions = unit_definitions(self.description)
-        all_ports = [*numeric.values(), *(single(v, self.shape_of(v)) for v in texts.values())]
-        return {p.name: p.as_port(definitions) for p in all_ports}
+    def _texts(self, variables: Iterable[Any]) -> dict[str, FMUPort]:
+        return {v.name: port_of(v.name, self.shape_of(v), (v,), {}) for v in variables}
 
     # -------------------------------------------------------------------- start values
 
@@ -141,7 +142,7 @@ class FMUFile:
             value = without_units(self.path.name, port, self.description.unitDefinitions, value)
         try:
             plain = np.asarray(value, dtype=object if number is None else None)
-            if plain.shape == (port.size,):  # a matrix may be given row by row, as FMI has it
+            if plain.shape == (port.size,):  # a matrix may be given row by row, as in FMI
                 plain = plain.reshape(port.shape)
             values = np.broadcast_to(plain, port.shape).ravel().tolist()
             fits = all(_fits(kind, number, v) for v in values)
@@ -162,7 +163,7 @@ class FMUFile:
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output port, the input ports on which it depends directly.
 
-        From the model structure: dependencies that are left out mean all, an empty list none.
+        It comes from the model structure, in which missing dependencies mean all, and an empty list none.
         """
         port_of = {self.key(v): name for name, p in self.input_ports.items() for v in p.variables}
         numbers = self.version.numbers
@@ -183,7 +184,7 @@ class FMUFile:
         return found
 
     def key(self, variable: Any) -> tuple[str, int]:
-        """Return what aliases share: the functions that get and set them, and the value reference."""
+        """Return the key that aliases share: the name of their functions, and their value reference."""
         return self.version.numbers[variable.type][0], variable.valueReference
 
 

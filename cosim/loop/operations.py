@@ -1,4 +1,4 @@
-"""The operations of the loop: what each one does, its addresses, and its LLVM IR.
+"""The operations of the loop, with their addresses and their LLVM IR.
 
 An operation is a frozen dataclass. Its fields of type Address go into the loop's table and
 differ from run to run; all others are written into the text of the loop, so that systems of
@@ -24,7 +24,7 @@ INLINE_PAIRS = 64  # of copies between connected ports; the compiler takes a min
 SLACK = 1e-9
 NOT_FINITE = (
     "is not finite (NaN or infinite)",
-    "look at the inputs that lead to it, or at the step: a plant that diverges ends so",
+    "check the inputs that lead to it, and the step: a diverging plant ends this way",
 )
 
 
@@ -35,7 +35,7 @@ class Operation(ABC):
     text
         its line in the schedule; "" shows none
     participant
-        the participant that it belongs to
+        the component that it belongs to
     every
         it runs at every n-th communication point
     fraction
@@ -62,11 +62,11 @@ class Operation(ABC):
         """Write the operation in LLVM IR."""
 
     def checked(self) -> Address:
-        """Return the address of the floats of which status -1 - i names number i, 0 if there are none."""
+        """Return the address of the checked floats, of which status -1 - i names number i; 0 for none."""
         return 0
 
     def fault(self) -> tuple[str, str]:
-        """Return what is wrong with a value that did not pass the check, and the remedy."""
+        """Return the fault of a value that did not pass the check, and the remedy."""
         return NOT_FINITE
 
     def seconds(self, t0: float, k: int, h: float) -> float:
@@ -91,7 +91,7 @@ class Copy(Operation):
 
     @property
     def is_plain(self) -> bool:
-        """Tell whether floats are copied as they are."""
+        """Tell whether floats are copied unchanged."""
         return (self.factor, self.offset) == (1.0, 0.0)
 
     def pairs(self) -> list[tuple[Address, Address]]:

@@ -23,7 +23,7 @@ KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctype
 
 
 class EndOfRun(Exception):
-    """A participant asks, inside a step, to end the run: a normal end, but the step is not completed."""
+    """A component asks, inside a step, to end the run: a normal end, but the step is not completed."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -35,50 +35,55 @@ class RunSignals:
 
     def __init__(self) -> None:
         self.exception: BaseException | None = None
-        self.participant = ""
-        self.time = 0.0
+        #: the component that raised it, and when
+        self.place = ""
         #: Ctrl-C was pressed; the next callback or the end of the chunk ends the run
         self.interrupted = False
-        #: the participant that asked to end the run, and when; "" while none does
+        #: the component that asked to end the run, and when; "" while none does
         self.end = ""
         #: (1,) 1 when the loop is to end at the next point
         self.stop = np.zeros(1, dtype=np.int64)
         self._callbacks: list[Any] = []
 
     def clear(self) -> None:
-        """Forget all signals: the simulation goes on from where it stands, or from a snapshot."""
+        """Clear all signals: the simulation continues from the present point, or from a snapshot."""
         self.exception, self.interrupted = None, False
         self.set_end("")
 
     def set_end(self, text: str) -> None:
-        """Let the run end at the next point, or go on if the text is empty."""
+        """Let the run end at the next point, or continue if the text is empty."""
         self.end, self.stop[0] = text, bool(text)
 
     def ask_to_end(self, name: str, t: float, at_end: bool) -> None:
-        """Note that a participant asks at t to end the run.
+        """Note that a component asks at t to end the run.
 
-        At the end of a step the run goes on to the communication point that is reached;
-        inside it, EndOfRun leaves the step.
+        At the end of a step the run continues to the communication point that is reached;
+        inside a step, EndOfRun leaves it.
         """
         text = f"{name} asked to end the simulation at t = {t:.10g} s"
         if not at_end:
             raise EndOfRun(text)
         self.set_end(self.end or text)
 
+    def note(self, exception: BaseException, name: str, t: float, when: str = "at") -> None:
+        """Keep an exception that a component raised, for the simulation."""
+        self.exception, self.place = exception, f"{name} failed {when} t = {t:g} s"
+
     def error(self) -> SimulationError:
         """Return the exception that a callback left as an error of the run."""
         text = str(self.exception)
-        if not isinstance(self.exception, SimulationError):  # which says place and time itself
+        if not isinstance(self.exception, SimulationError):  # which names place and time itself
             kind = type(self.exception).__name__
-            text = f"{self.participant} failed at t = {self.time:g} s: {kind}: {text}"
+            text = f"{self.place}: {kind}: {text}"
         error = SimulationError(text)
         error.__cause__ = self.exception
         return error
 
-    def callback(self, name: str, function: Callable[[float, float], None]) -> int:
+    def callback(self, name: str, function: Callable[[float, float], None], when: str = "at") -> int:
         """Return the address of a C callback for `function(t, h)`, which turns any exception into status 1.
 
-        The callback lives as long as these signals.
+        `when` says in an error how the exception is related to t. The callback lives as long as these
+        signals.
         """
 
         def guarded(_: int, t: float, h: float) -> int:
@@ -87,7 +92,7 @@ class RunSignals:
                 if self.interrupted:
                     raise KeyboardInterrupt
             except BaseException as exception:
-                self.exception, self.participant, self.time = exception, name, t
+                self.note(exception, name, t, when)
                 return 1
             return 0
 
@@ -99,8 +104,8 @@ class RunSignals:
 def ctrl_c(signals: RunSignals) -> Iterator[None]:
     """Note Ctrl-C, to be acted upon between chunks or after a callback.
 
-    KeyboardInterrupt at any moment might be raised while Python enters a callback from C, where
-    it is printed and lost, and the run goes on. A second Ctrl-C is raised at once.
+    KeyboardInterrupt might otherwise be raised while Python enters a callback from C, where it is
+    printed and lost, and the run continues. A second Ctrl-C is raised at once.
     """
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -120,7 +125,7 @@ def ctrl_c(signals: RunSignals) -> Iterator[None]:
 
 
 class Failing(Protocol):
-    """An instance, as far as an error about it needs it."""
+    """The part of an instance that an error message needs."""
 
     name: str
 

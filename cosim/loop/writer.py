@@ -1,8 +1,8 @@
-"""Writes the text of the loop in LLVM IR: values, blocks, loops and checks.
+"""The writer of the loop's LLVM IR: values, blocks, loops and checks.
 
-The text is made by f-strings. `llvmlite.ir.IRBuilder` builds the same instructions as Python
-objects and needs 30 times as long, for every run of every system: 0.25 s for 300 plants with
-a controller each, a third of the time that it takes to set such a run up.
+It writes f-strings. `llvmlite.ir.IRBuilder` builds the same instructions as Python objects and
+needs 30 times as long, for every run of every system: 0.25 s for 300 plants with a controller
+each, a third of the time that the set-up of such a run takes.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
-INLINE = 8  # up to this many floats an operation is written out, above it becomes a loop
+INLINE = 8  # up to this many floats, an operation is unrolled; above, it is a loop
 
 
 def number(x: float) -> str:
@@ -19,7 +19,7 @@ def number(x: float) -> str:
 
 
 class Writer:
-    """Writes operations, one after the other; `exits` are the ways into the block that reports a failure."""
+    """Writes operations in order; `exits` are the branches to the block that reports a failure."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -81,7 +81,7 @@ class Writer:
         self.start_block(on)
 
     def each(self, n: int, body: Callable[[int | str], None], inline: int = INLINE) -> None:
-        """Write body(i) for i = 0 .. n - 1: written out, or as a loop when there are many."""
+        """Write body(i) for i = 0 .. n - 1: unrolled, or as a loop for more than `inline`."""
         if n <= inline:
             for element in range(n):
                 body(element)
@@ -139,7 +139,7 @@ class Writer:
         return self.value(f"fmul double {x}, {y}")
 
     def time(self, fraction: float, substeps: int = 1) -> str:
-        """Return t_0 + (k + c) h: c is the fraction of a step, or that of the present one of its substeps."""
+        """Return t_0 + (k + c) h: c is the fraction of a step, or of the present substep."""
         c = "" if fraction == 0.0 else number(fraction)
         if substeps > 1:
             c = self.multiply(self.add(self.substep, number(fraction)), number(1.0 / substeps))
@@ -178,7 +178,7 @@ class Writer:
         self.check(self.value(f"sext i32 {status} to i64"))
 
     def check_fmi(self, status: str) -> None:
-        """Go on after fmiOK and fmiWarning; another status, a negative one too, is a failure."""
+        """Go on after fmiOK and fmiWarning; any other status, negative ones included, is a failure."""
         bad = self.value(f"icmp ugt i32 {status}, 1")
         code = self.value(f"select i1 {bad}, i32 {status}, i32 0")
         self.check(self.value(f"zext i32 {code} to i64"))

@@ -1,4 +1,4 @@
-"""From a system to running instances, and from its connections to copies between addresses."""
+"""The binding of a system: its components as running instances, its connections as copies."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Array
 from ..core.component import Component
 from ..core.participant import Participant
 from ..core.port import Port
 from ..core.time_grid import steps_between
-from ..core.variables import Array
 from ..errors import WiringError
 from ..loop.instance import Instance, MakesInstance, Setting, Stepping
 from ..loop.loop import Loop
@@ -38,9 +38,9 @@ class Binding:
         for t_k
     """
 
-    def __init__(self, system: System, plan: RunPlan, used: Iterable[Port], signals: RunSignals) -> None:
-        """Make the instances; `used` are the ports that are read beside those that are connected."""
-        self.system, self.plan, self.signals = system, plan, signals
+    def __init__(self, system: System, plan: RunPlan, used: Iterable[Port]) -> None:
+        """Make the instances; `used` are the ports that are read in addition to the connected ones."""
+        self.system, self.plan, self.signals = system, plan, RunSignals()
         self.instances: dict[str, Instance] = {}
         components = system.participants
         self.blocks = system.block_order()
@@ -59,7 +59,7 @@ class Binding:
                     is_stage=plan.coupling == "continuous",
                     jit=plan.jit,
                     used=names[name],
-                    signals=signals,
+                    signals=self.signals,
                 )
                 self.instances[name] = _instance(name, component, setting)
             for c in system.text_connections:
@@ -83,7 +83,7 @@ class Binding:
         return steps_between(block.sample_period, self.plan.step, f"{name}: sample period")
 
     def close(self) -> list[str]:
-        """Free the instances; return how isolated ones crashed while they were freed."""
+        """Free the instances; return the crashes of isolated ones while they were freed."""
         return [crash for instance in self.instances.values() if (crash := instance.stop())]
 
     # --------------------------------------------------------------------- connections
@@ -119,16 +119,16 @@ class Binding:
         )
 
     def copies(self, name: str, every: int = 1, without: Collection[Connection] = ()) -> list[Operation]:
-        """Return the operations that copy the inputs of an instance, some connections left out."""
+        """Return the operations that copy the inputs of an instance, without some connections."""
         left_out = {id(c) for c in without}
         return [replace(op, every=every) for c, op in self._copies[name] if id(c) not in left_out]
 
     def copy_from(self, c: Connection, source: int) -> Operation:
-        """Return the operation of a connection, from another address."""
+        """Return the operation of a connection, with another source address."""
         return replace(self._copy(c, source), text="")
 
     def block(self, name: str, fraction: float = 0.0) -> list[Operation]:
-        """Return the operations that bring a block its inputs and let it act."""
+        """Return the operations that copy the inputs of a block and run it."""
         instance, every = self.instances[name], self.every[name] or 1
         assert isinstance(instance, Stepping)
         acting = (replace(op, every=every) for op in instance.step(fraction))

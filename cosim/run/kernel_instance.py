@@ -1,7 +1,7 @@
 """The running instance of a block or continuous system: its kernels and a copy of its storage.
 
-Kernels are compiled, or called back as Python where Numba cannot compile them. Inputs and
-states stay where they lie in the storage, so there is nothing to latch or to set.
+Kernels are compiled, or called back as Python where Numba cannot compile them. They read
+inputs and states in place, so an instance has nothing to latch or to set.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..codegen.kernels import kernel_addresses
 from ..core.dependencies import dependencies
 from ..core.participant import KERNEL_TIMES, Continuous, LinearContinuous, Participant
-from ..core.variables import Array
 from ..errors import CompilationError, CompiledKernelsWarning, DeclarationError, WiringError
 from ..loop.instance import Setting
 from ..loop.operations import Call, Copy, Operation
@@ -30,8 +30,8 @@ class KernelInstance:
         is_continuous = isinstance(participant, Continuous)
         if setting.is_stage and is_continuous and "derivatives" not in participant.kernels:
             raise WiringError(
-                f"{name} ({type(participant).__name__}) moves by its advance alone and has no derivatives, "
-                'which stage coupling integrates; use coupling="sampled"'
+                f"{name} ({type(participant).__name__}) has only an advance and no derivatives, "
+                'which stage coupling needs; use coupling="sampled"'
             )
         self.name = name
         self.signals = setting.signals
@@ -54,7 +54,8 @@ class KernelInstance:
                 self.is_compiled = False
         if not self.is_compiled:
             for kernel in participant.kernels:
-                self._addresses[kernel] = self.signals.callback(name, self._interpreted(kernel))
+                when = "in the step from" if kernel == "advance" else "at"
+                self._addresses[kernel] = self.signals.callback(name, self._interpreted(kernel), when)
         states = self.participant.zones["state"]
         self.n_states = states[1] if is_continuous else 0
         self.state_address = self.base + 8 * states[0]
@@ -74,7 +75,7 @@ class KernelInstance:
             before = self.participant.memory.copy()
             function = KERNEL(self._addresses["initialize"])
             if function(self.base, t0, 0.0) != 0 and self.signals.exception is None:
-                self.participant.memory[:] = before  # compiled code does not say which exception it was
+                self.participant.memory[:] = before  # compiled code does not name the exception
                 again = KERNEL(self.signals.callback(self.name, self._interpreted("initialize")))
                 if again(self.base, t0, 0.0) == 0:
                     raise SimulationError(f"{self.name} failed in initialize(self); check its parameters")
@@ -111,7 +112,7 @@ class KernelInstance:
             )
 
     def stop(self) -> str:
-        """Nothing to release, nothing that could crash."""
+        """Return "": the memory is freed with the instance, without a crash."""
         return ""
 
     #: Python attributes and the storage can be copied
@@ -125,7 +126,7 @@ class KernelInstance:
         return made.__module__, made.__qualname__, self.is_compiled, self.participant.memory.size
 
     def save(self, serialised: bool = True) -> tuple[Array, dict[str, Any]]:
-        """Return a copy of the storage, and of the attributes that a block in Python has beside it."""
+        """Return a copy of the storage, and of the Python attributes of a block that runs in Python."""
         attributes = {} if self.is_compiled else self.participant.own_attributes()
         return self.participant.memory.copy(), attributes
 
@@ -168,21 +169,15 @@ class KernelInstance:
             ops.append(self._call("outputs", "outputs", fraction, self._outputs if final else (0, 0)))
         return ops
 
-    def read_texts(self) -> list[Operation]:
-        """There are no strings or binary data."""
+    def _nothing(self, fraction: float = 0.0) -> list[Operation]:
+        """Return no operations: a kernel has no texts and reads inputs and states in place."""
         return []
 
-    def latch(self) -> list[Operation]:
-        """Inputs are read where they lie."""
-        return []
+    read_texts = latch = set_states = complete = _nothing
 
     def advance(self) -> list[Operation]:
         """Carry the states over the step."""
         return [self._call("advance", "advance", 0.0, (self.state_address, self.n_states))]
-
-    def set_states(self, fraction: float) -> list[Operation]:
-        """States are combined where they lie."""
-        return []
 
     def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Evaluate the derivatives and copy them to `target`."""
@@ -190,10 +185,6 @@ class KernelInstance:
             return []
         copy = Copy(source=self.derivative_address, target=target, count=self.n_states)
         return [self._call("derivatives", "derivatives", fraction), copy]
-
-    def complete(self) -> list[Operation]:
-        """Nothing happens between steps."""
-        return []
 
     def feedthrough(self) -> dict[str, set[str]]:
         """Return, for every output, the inputs on which it depends directly."""
@@ -211,8 +202,9 @@ class KernelInstance:
         return "?"
 
     def failed(self, status: int, t: float) -> str:
-        """Return the meaning of a kernel that failed."""
-        return f"{self.name} failed with an exception in its kernel (jit=False shows where) at t = {t:g} s"
+        """Return the message for a kernel that failed when it was called at t."""
+        where = "(jit=False shows where), called at"
+        return f"{self.name} failed with an exception in its kernel {where} t = {t:g} s"
 
     def log(self) -> list[str]:
         """Kernels do not log."""

@@ -5,25 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any, Literal, get_args
 
 from ..core.port import Port
-from ..core.tableaus import TABLEAUS
 from ..core.time_grid import steps_between
-from ..errors import OptionError, TimeError, WiringError, did_you_mean
+from ..core.whole_number import whole_number
+from ..errors import OptionError, TimeError, WiringError, check_known
 from ..system.system import System
 
 Coupling = Literal["sampled", "iterated", "continuous"]
 Solver = Literal["ode1", "ode2", "ode3", "ode4"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class RunPlan:
-    """The options of a run, which `simulate` explains; wrong ones are refused when the plan is made.
+    """The options of a run, which `simulate` explains; making the plan checks them.
 
-    It goes whole to the instances, the couplings and the recorder, and a branch of a simulation
-    is made from it again. `record` and `statistics` become tuples of names.
+    The instances, the couplings and the recorder get the whole plan, and a branch of a simulation
+    shares it. `record` and `statistics` become tuples of names.
     """
 
     step: float
@@ -41,20 +41,15 @@ class RunPlan:
         step, start = _seconds("step", self.step), _seconds("start", self.start)
         if step <= 0.0:
             raise TimeError(f"step={step:g} s; a communication step must be above zero")
-        for name, value, known in (
-            ("coupling", self.coupling, get_args(Coupling)),
-            ("solver", self.solver, tuple(TABLEAUS)),
-        ):
-            if value not in known:
-                raise OptionError(f"{name} '{value}' is not known" + did_you_mean(value, known))
-        if not isinstance(self.decimation, Integral) or self.decimation < 1:
-            raise OptionError(f"decimation={self.decimation!r} must be a whole number of steps, 1 or more")
+        check_known("coupling", self.coupling, get_args(Coupling))
+        check_known("solver", self.solver, get_args(Solver))
         if not (isinstance(self.tolerance, Real) and 0.0 < float(self.tolerance) < 1.0):
             raise OptionError(
                 f"tolerance={self.tolerance!r} must be a number between 0 and 1: it is relative to the size "
                 "of each exchanged value"
             )
-        checked: dict[str, Any] = {"step": step, "start": start, "decimation": int(self.decimation)}
+        decimation = whole_number("decimation", self.decimation, error=OptionError)
+        checked: dict[str, Any] = {"step": step, "start": start, "decimation": decimation}
         checked |= {"record": _port_names(self.record), "statistics": _port_names(self.statistics)}
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -77,13 +72,13 @@ class RunPlan:
         ]
 
     def watched(self, system: System) -> list[Port]:
-        """Return the ports to keep statistics of; refuse strings and binary data that are asked for."""
+        """Return the ports to keep statistics of; refuse strings and binary data among the given ones."""
         if self.statistics is None:
             return [port for port in self.recorded(system) if port.kind == "number"]
         ports = [_readable(system, name) for name in self.statistics]
         for port in ports:
             if port.kind != "number":
-                raise WiringError(f"{port} is a {port.kind}; statistics are of numbers, so leave it out")
+                raise WiringError(f"{port} is a {port.kind}; statistics need numbers, so leave it out")
         return ports
 
 

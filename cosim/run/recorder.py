@@ -1,9 +1,9 @@
 """The recorder of a run: signals, statistics and texts, written by operations of the loop.
 
-Everything is recorded at communication points, after the blocks. Rows of floats and the
-statistics are written by the compiled loop, strings and binary data by a callback. A run
-that goes on from a point that was evaluated before records that point again as its first
-one, by the same operations (loop.py: `resume`).
+Everything is recorded at communication points, after the blocks. The compiled loop writes
+rows of floats and the statistics, a callback the strings and binary data. A run that
+continues from an evaluated point records that point again, as its first one, by the same
+operations (loop.py: `resume`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Array
 from ..core.port import Port
-from ..core.variables import Array
 from ..errors import RecordError
 from ..loop.operations import Call, Operation, Record, Sample
-from ..loop.signals import RunSignals
 from ..result import Statistics
 from .binding import Binding
 
@@ -30,20 +29,13 @@ MEMORY_LIMIT = 200_000_000
 class Recorder:
     """Records ports at every n-th communication point, and keeps statistics of ports at every one."""
 
-    def __init__(
-        self,
-        recorded: Sequence[Port],
-        watched: Sequence[Port],
-        decimation: int,
-        binding: Binding,
-        signals: RunSignals,
-    ) -> None:
+    def __init__(self, recorded: Sequence[Port], watched: Sequence[Port], binding: Binding) -> None:
         texts = [port for port in recorded if port.kind != "number"]
         self.recorded, self.watched = [p for p in recorded if p.kind == "number"], watched
-        self.decimation = decimation
+        self.decimation = decimation = binding.plan.decimation
         self.texts: dict[str, list[str | bytes]] = {str(port): [] for port in texts}
         self._place = np.zeros(2, dtype=np.int64)  # address of the rows, number of rows so far
-        self._first = 0  # the point at which the first row lies, over the decimation
+        self._first = 0  # the point of the first row, divided by the decimation
         self._recorded, self._watched = (_addresses(ports, binding) for ports in (self.recorded, watched))
         self._rows: Array = np.empty((0, len(self._recorded)))
         self._kept = np.zeros((max(len(self._watched), 1), 4))
@@ -57,7 +49,7 @@ class Recorder:
         self.operations: list[Operation] = []
         if texts:
             line = f"record {', '.join(self.texts)} (Python callback)"
-            keep = signals.callback("record", keep_texts)
+            keep = binding.signals.callback("record", keep_texts)
             self.operations.append(Call(text=line, function=keep, every=decimation))
         if len(self._watched):
             sample = Sample(
@@ -79,7 +71,7 @@ class Recorder:
             self.operations.append(record)
 
     def open(self, k: int, last: int) -> None:
-        """Make room for the points k to `last`, and forget all that was recorded before."""
+        """Make room for the points k to `last`, and discard the earlier recording."""
         self._first = -(-k // self.decimation)
         self._rows = _room(last // self.decimation - self._first + 1, len(self._recorded))
         self._place[:] = self._rows.ctypes.data, 0
@@ -120,7 +112,7 @@ def _addresses(ports: Sequence[Port], binding: Binding) -> np.ndarray[Any, np.dt
 
 
 def _parts(ports: Iterable[Port]) -> Iterator[tuple[Port, slice, bool]]:
-    """Return where the floats of each port lie among those of all ports, and whether it is a scalar."""
+    """Return, for each port, the slice of its floats among those of all ports, and whether it is a scalar."""
     first = 0
     for port in ports:
         yield port, slice(first, first + port.count), port.shape == () or port.count == 1

@@ -1,21 +1,21 @@
-"""A run that can be stopped and carried on, returned to an earlier point, and branched.
+"""Simulations: runs that can be paused, continued, returned to an earlier point, and branched.
 
     with Simulation(system, step=0.01) as simulation:
         simulation.run(5.0)
-        there = simulation.snapshot()
+        before = simulation.snapshot()
         one = simulation.run(10.0)
-        simulation.restore(there)
+        simulation.restore(before)
         same = simulation.run(10.0)
 
-`simulate` is one run from start to stop. Time is the integer k, t_k = start + k step; nothing
-is summed up. A run is put together in four steps, each in a file of its own:
+`simulate` is one run from start to stop. Time is the integer k, with t_k = start + k step; no
+sum of steps is kept. A run is built in four steps, each in a separate file:
 
     plan.py      the options, checked
     binding.py   the components of the system as running instances, its connections as copies
     coupling/    the operations of a communication step, in their order: `Result.schedule`
     recorder.py  signals, texts and statistics, recorded at communication points
 
-and then carried out by the compiled loop (cosim/loop).
+The compiled loop (cosim/loop) then carries it out.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self
 
-from ..core.variables import Array
+from ..arrays import Array
 from ..errors import SimulationEndedWarning, SnapshotError, TimeError, WiringError
 from ..loop.loop import Loop
-from ..loop.signals import EndOfRun, RunSignals, ctrl_c
+from ..loop.signals import EndOfRun, ctrl_c
 from ..result import Interrupted, Result, SimulationError
 from ..system.system import System
 from .binding import Binding
@@ -79,24 +79,14 @@ def simulate(
         called with (steps done, steps in all) about ten times a second
 
     Raises CosimError for anything that can be checked before the run, SimulationError (with
-    `result`, computed until then) when a participant fails or gives a value that is not
-    finite, Interrupted (with `result`) on Ctrl-C. When a participant asks to end the run,
-    that is not an error: the result up to there is returned, `result.ended` says which
-    participant asked and when, and SimulationEndedWarning is warned.
+    `result`, computed until then) when a component fails or gives a value that is not
+    finite, Interrupted (with `result`) on Ctrl-C. A component that asks to end the run is
+    not an error: the result up to that point is returned, `result.ended` names the
+    component and the time, and SimulationEndedWarning is issued.
     """
-    plan = RunPlan(
-        step=step,
-        start=start,
-        coupling=coupling,
-        solver=solver,
-        record=record,
-        statistics=statistics,
-        decimation=decimation,
-        jit=jit,
-        tolerance=tolerance,
-    )
+    plan = RunPlan(step, start, coupling, solver, record, statistics, decimation, jit, tolerance)
     plan.point(stop)  # before FMUs are loaded
-    with Simulation(system, **vars(plan)) as simulation:
+    with Simulation._planned(system, plan) as simulation:
         return simulation.run(stop, progress)
 
 
@@ -113,8 +103,8 @@ class Snapshot:
     time
         of the point, in s
     portable
-        False when an FMU cannot serialise its state: then the snapshot serves only the
-        simulation that it was taken from, while that is open
+        False when an FMU cannot serialise its state: the snapshot can then be restored only
+        in the simulation that it was taken from, while that one is open
     """
 
     time: float
@@ -149,37 +139,38 @@ class Simulation:
         jit: bool = True,
         tolerance: float = 1e-8,
     ) -> None:
+        self._open(
+            system, RunPlan(step, start, coupling, solver, record, statistics, decimation, jit, tolerance)
+        )
+
+    @classmethod
+    def _planned(cls, system: System, plan: RunPlan) -> Self:
+        """Return a simulation with the options of a plan."""
+        simulation = cls.__new__(cls)
+        simulation._open(system, plan)
+        return simulation
+
+    def _open(self, system: System, plan: RunPlan) -> None:
         if not isinstance(system, System):
             raise WiringError(f"{system!r} must be a System; give System({{'plant': ...}}, [...])")
-        self.system = system
-        self.plan = plan = RunPlan(
-            step=step,
-            start=start,
-            coupling=coupling,
-            solver=solver,
-            record=record,
-            statistics=statistics,
-            decimation=decimation,
-            jit=jit,
-            tolerance=tolerance,
-        )
+        self.system, self.plan = system, plan
         recorded, watched = plan.recorded(system), plan.watched(system)
-        self._signals = RunSignals()
-        self._binding = Binding(system, plan, [*recorded, *watched], self._signals)
+        self._binding = Binding(system, plan, [*recorded, *watched])
+        self._signals = self._binding.signals
         try:
-            self._recorder = Recorder(recorded, watched, plan.decimation, self._binding, self._signals)
+            self._recorder = Recorder(recorded, watched, self._binding)
             self._coupling = self._coupled()
         except BaseException:
             self._binding.close()
             raise
         self._recording = [*self._recorder.operations, *self._binding.keep]
-        #: the arrays that belong to the state, beside those of the instances
+        #: the arrays that belong to the state, besides those of the instances
         self._memory = [*self._binding.memory, *self._coupling.memory]
         self._loop: Loop | None = None
         #: the point that comes next, or, once its outputs have been evaluated, the present one
         self._k, self._acted = 0, False
         self._incomplete = self._closed = False
-        #: the participant that asked to end the run, and when
+        #: the component that asked to end the run, and when
         self._ended = ""
         self._token = object()
         self._first = 0
@@ -209,7 +200,7 @@ class Simulation:
             self._binding.close()
 
     def close(self) -> None:
-        """Terminate and free the FMUs; results stay.
+        """Terminate and free the FMUs; results remain valid.
 
         Raises SimulationError when an isolated FMU crashes while it is freed, Interrupted on Ctrl-C
         while it hangs there, both with the last `result`.
@@ -227,21 +218,21 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """The communication point at which the simulation stands, in s."""
+        """The present communication point, in s."""
         return self.plan.start + self._k * self.plan.step
 
     # ----------------------------------------------------------------------------- runs
 
     def run(self, until: float, progress: Callable[[int, int], None] | None = None) -> Result:
-        """Run from the present communication point to `until`, in s; the result has both.
+        """Run from the present communication point to `until`, in s; the result includes both.
 
-        Raises SimulationError (with `result`, computed until then) when a participant fails
+        Raises SimulationError (with `result`, computed until then) when a component fails
         or gives a value that is not finite, Interrupted (with `result`) on Ctrl-C. When a
-        participant asks to end the run, the result until then is returned: `Result.ended`.
+        component asks to end the run, the result until then is returned: `Result.ended`.
         """
         last = self.plan.point(until)
         if last < self._k or (last == self._k and self._acted):
-            raise TimeError(f"run until {until:g} s: the simulation is at {self.time:g} s already")
+            raise TimeError(f"run until {until:g} s: the simulation is already at {self.time:g} s")
         with ctrl_c(self._signals):
             self._check_usable("run")
             loop = self._begun()
@@ -251,7 +242,7 @@ class Simulation:
             return self._last
 
     def _begun(self) -> Loop:
-        """Return the loop; the first time, compile it and initialize the participants."""
+        """Return the loop; the first time, compile it and initialize the instances."""
         if self._loop is None:
             self._incomplete = True
             self._began = time.perf_counter()
@@ -288,7 +279,7 @@ class Simulation:
                         return self._end(signals.exception.text)
                     raise self._binding.error(loop)
                 self._k = int(loop.report[1])
-                self._acted = self._k < until  # the last point, or where a participant asked to end
+                self._acted = self._k < until  # the last point, or where a component asked to end
                 if signals.end and self._acted:
                     return self._end(signals.end)
                 self._incomplete = False
@@ -307,7 +298,7 @@ class Simulation:
         return self._result()
 
     def _end(self, text: str) -> Result:
-        """Return the result of a run that a participant asked to end."""
+        """Return the result of a run that a component asked to end."""
         self._ended = text
         warnings.warn(f"{text}; the result ends there", SimulationEndedWarning, stacklevel=4)
         return self._result()
@@ -315,7 +306,7 @@ class Simulation:
     # ------------------------------------------------------------------------ snapshots
 
     def snapshot(self) -> Snapshot:
-        """Return the whole state of the simulation; `restore` returns to it, as often as you like.
+        """Return the whole state of the simulation; `restore` returns to it, any number of times.
 
         Raises SnapshotError, naming the FMUs, when they cannot get and set their state.
         """
@@ -334,22 +325,22 @@ class Simulation:
         return Snapshot(self.time, portable, place, parts, memory, self._token, self._kind())
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Return to a snapshot; signals recorded since then stay in the results that were returned.
+        """Return to a snapshot; results that were returned since then keep their signals.
 
-        A snapshot of another simulation serves if that one has the same participants and
-        options. Raises SnapshotError if it does not.
+        A snapshot of another simulation is accepted if that one has the same components and
+        options. Raises SnapshotError otherwise.
         """
         self._check_open("restore a snapshot")
         if not isinstance(snapshot, Snapshot):
             raise SnapshotError(f"{snapshot!r} must be a snapshot, as `snapshot` returns it")
         if snapshot.kind != self._kind():
             raise SnapshotError(
-                f"the snapshot at t = {snapshot.time:g} s is of another simulation: participants, connected "
-                "and recorded ports, step, start, coupling, solver and jit must be the same"
+                f"the snapshot at t = {snapshot.time:g} s belongs to another simulation: components, "
+                "connected and recorded ports, step, start, coupling, solver and jit must be the same"
             )
         if snapshot.owner is not self._token and not snapshot.portable:
             raise SnapshotError(
-                f"the snapshot at t = {snapshot.time:g} s serves only the simulation that it was taken from: "
+                f"the snapshot at t = {snapshot.time:g} s can be restored only in its own simulation: "
                 f"{self._unable('can_serialise')} cannot serialise its state"
             )
         self._begun()
@@ -362,18 +353,18 @@ class Simulation:
         self._signals.clear()
 
     def branch(self) -> Simulation:
-        """Return a second simulation at the same point, which goes its own way.
+        """Return a second simulation at the same point, which runs independently of this one.
 
         Raises SnapshotError, naming the FMUs, when they cannot serialise their state, or crash when
-        they take it over in another process.
+        it is restored in another process.
         """
         snapshot = self.snapshot()
         if not snapshot.portable:
             raise SnapshotError(
                 f"{self._unable('can_serialise')} cannot serialise its state (canSerializeFMUState), "
-                "which a second simulation needs; snapshot and restore serve within one simulation"
+                "which a second simulation needs; within one simulation, use snapshot and restore"
             )
-        other = Simulation(self.system, **vars(self.plan))
+        other = Simulation._planned(self.system, self.plan)
         try:
             other.restore(snapshot)
         except SimulationError as error:
@@ -382,9 +373,9 @@ class Simulation:
             if not crashed:
                 raise
             raise SnapshotError(
-                f"{error}\nthe bytes that {crashed} gives of its state do not serve in another process, "
-                "perhaps because they contain addresses; for a branch, load it without isolated=True; "
-                "this simulation goes on"
+                f"{error}\nthe serialised state of {crashed} cannot be restored in another process, perhaps "
+                "because it contains addresses; for a branch, load the FMU without isolated=True; "
+                "this simulation can go on"
             ) from error
         except BaseException:
             other.close()
@@ -409,7 +400,9 @@ class Simulation:
         self._check_open(what)
         if self._incomplete:
             why = self._ended or "it ended within a step"
-            raise SimulationError(f"this simulation cannot {what}: {why}; restore a snapshot, or start anew")
+            raise SimulationError(
+                f"this simulation cannot {what}: {why}; restore a snapshot, or make a new simulation"
+            )
 
     # ---------------------------------------------------------------------------- ends
 

@@ -16,7 +16,7 @@ def evaluation_order(
     connections: list[Connection],
     recorded: Iterable[Port],
 ) -> list[dict[str, bool]]:
-    """Order blocks and outputs by dependence, in rounds of members that are independent of each other.
+    """Order blocks and outputs by dependence, in rounds; the members of a round are independent.
 
     feedthrough
         for every component that moves, the inputs on which each output depends directly

@@ -5,12 +5,12 @@
         [("plant.s", "control.s"), ("control.u", "plant.u")],
     )
 
-A port is named `participant.port`; elements of an array count from 1, as in Modelica
+A port is named `component.port`; elements of an array count from 1, as in Modelica
 and in FMU variable names: `building.accel[3]`, `building.accel[2:4]`. Everything that
 can be checked without time is checked here.
 
-Strings and binary data are handed on as numbers are: read at t_k, set before the step from
-t_k. A String goes to a String, a Binary to a Binary, one value each.
+Strings and binary data are passed on like numbers: read at t_k, set before the step from t_k.
+A String goes to a String, a Binary to a Binary, one value each.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from types import NoneType
 
 import numpy as np
 
+from ..arrays import Array
 from ..core.component import Component
 from ..core.port import Direction, Port
-from ..core.variables import Array
 from ..errors import WiringError, did_you_mean
 
 
@@ -69,7 +69,7 @@ class System:
         self._links: set[tuple[str, str]] = set()
         if not isinstance(participants, (Mapping, NoneType)):
             raise WiringError(
-                f"{participants!r} must be a dictionary of participants, such as {{'plant': ...}}"
+                f"{participants!r} must be a dictionary of components, such as {{'plant': ...}}"
             )
         for name, component in (participants or {}).items():
             self.add(name, component)
@@ -81,7 +81,7 @@ class System:
     def add(self, name: str, component: Component) -> None:
         """Add a component under a name of letters, digits and underscores."""
         if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z_]\w*", name):
-            raise WiringError(f"participant name '{name}' must be letters, digits and underscores")
+            raise WiringError(f"component name '{name}' must be letters, digits and underscores")
         if isinstance(component, type) or not isinstance(component, Component):
             wanted = (
                 f"{component.__name__}(...)"
@@ -90,9 +90,9 @@ class System:
             )
             raise WiringError(f"'{name}' is {component!r}, which cannot take part in a system; give {wanted}")
         if name in self.participants:
-            raise WiringError(f"the system has a participant '{name}' already; choose another name")
+            raise WiringError(f"the system already has a component '{name}'; choose another name")
         if any(component is other for other in self.participants.values()):
-            raise WiringError(f"'{name}' is the same object as another participant; make a second one")
+            raise WiringError(f"'{name}' is the same object as another component; make a second one")
         self.participants[name] = component
 
     def connect(
@@ -114,7 +114,7 @@ class System:
         """
         for name in (source, target):
             if not isinstance(name, str):
-                raise WiringError(f"{name!r} must be a port, written as text: 'participant.port'")
+                raise WiringError(f"{name!r} must be a port, written as text: 'component.port'")
         out, into = self.port(source, "output"), self.port(target, "input")
         if out.kind != into.kind:
             kinds = " and ".join(
@@ -132,7 +132,7 @@ class System:
             if other.target.first < into.first + into.count and into.first < (
                 other.target.first + other.target.count
             ):
-                raise WiringError(f"{into} is connected already, to {other.source}; an input has one source")
+                raise WiringError(f"{into} is already connected to {other.source}; an input has one source")
         if out.kind == "number":
             scale, offset = _factors(out, into, transformation)
             self._append(self.connections, Connection(out, into, scale, offset, _initial(out, initial)))
@@ -140,8 +140,8 @@ class System:
             self._append(self.text_connections, Connection(out, into))
         else:
             raise WiringError(
-                f"{out} -> {into}: a {out.kind} cannot be delayed or transformed; leave initial and "
-                "transformation out"
+                f"{out} -> {into}: a {out.kind} cannot be delayed or transformed; leave out initial and "
+                "transformation"
             )
 
     def _append(self, connections: list[Connection], connection: Connection) -> None:
@@ -165,10 +165,10 @@ class System:
         """Find a port by its name; `direction` is "input" or "output" (states count as outputs)."""
         where, dot, name = text.partition(".")
         if not dot:
-            raise WiringError(f"'{text}' is not a port; write participant.port")
+            raise WiringError(f"'{text}' is not a port; write component.port")
         if where not in self.participants:
             raise WiringError(
-                f"'{text}': the system has no participant '{where}'" + did_you_mean(where, self.participants)
+                f"'{text}': the system has no component '{where}'" + did_you_mean(where, self.participants)
             )
         component = self.participants[where]
         ports = component.ports(direction)

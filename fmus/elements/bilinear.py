@@ -5,8 +5,8 @@
     z' = d' while |q| = k dy and q d' > 0, otherwise 0      (3)
 
 A linear spring in parallel with an elastic and perfectly plastic one; z is the plastic
-deformation of the latter. The return to the bound (2) is exact for a deformation that
-goes straight from d0 to d.
+deformation of the latter. The return to the bound (2) is exact when the deformation goes
+straight from d0 to d.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 
 z starts at 0 and tends to +-(beta + gamma)^(-1/n). (2) is integrated by the implicit
 midpoint rule, solved by Newton's method; the rate cancels, so the law does not depend on
-how fast the path is followed.
+the speed along the path.
 
 Source: Y.-K. Wen, Method for random vibration of hysteretic systems, Journal of the
 Engineering Mechanics Division 102 (1976) 249-263, DOI 10.1061/JMCEA3.0002106.
@@ -22,7 +22,7 @@ from .element import OWN, YIELDING, Element, Response
 Z = OWN  # z, without unit
 NEWTON_STEPS = 30
 NEWTON_TOLERANCE = 1e-14  # of z, whose size is near 1
-YIELD_SHARE = 0.95  # of the bound of z, from where on the element is reported as yielding
+YIELD_SHARE = 0.95  # of the bound of z; beyond it the element is reported as yielding
 
 
 def bouc_wen(
@@ -30,7 +30,7 @@ def bouc_wen(
 ) -> Element:
     """Make an element of stiffness k1 (N/m), and of alpha k1 when it is far beyond dy (m).
 
-    n sets how sharp the knee is; beta and gamma set the shape of the loop.
+    n sets the sharpness of the knee; beta and gamma set the shape of the loop.
     """
     return Element(law, row, (k1, alpha, dy, n, beta, gamma), k0=k1, scale=dy)
 

@@ -14,12 +14,12 @@ segment stays elastic, the rest has a hinge wherever an end yields,
     kappa_i = m_i/EI + (1/r - 1) a_i/EI                                     (3)
 
 a_i is the centre of the elastic range and kappa_i the curvature, whose second term is
-plastic. The rotations go straight from their start to their end; each yielding or
-unloading on that way is found where it happens, in closed form.
+plastic. The rotations go straight from their start to their end; each yielding or unloading
+on this path is located in closed form.
 
-With `late` an event takes effect at the next step instead, and the moment overshoots
-meanwhile: first order in h. This is how the benchmark's own code proceeds, and it is here
-for comparison.
+With `late` an event takes effect at the next step instead, and the moment overshoots until
+then, an error of first order in h. The benchmark's own code does this; the option serves the
+comparison with it.
 
 Source of the two components: R. W. Clough, K. L. Benuska and E. L. Wilson, Inelastic
 earthquake response of tall buildings, Proc. 3rd World Conference on Earthquake
@@ -40,8 +40,8 @@ K11, K12, R, M_Y, LATE, EI_PLACE = range(6)
 CENTRE = OWN  # a_i, N*m
 MOMENT = OWN + 1  # m_i, N*m
 
-MOST_EVENTS = 6  # bound on the pieces of a straight way; two ends make three
-ON_BOUND = 1.0 - 1e-12  # share of M_y from where on an end is at its bound: rounding of a_i + M_y - a_i
+MOST_EVENTS = 6  # bound on the pieces of a straight path; two ends make three
+ON_BOUND = 1.0 - 1e-12  # share of M_y above which an end is at its bound: rounding of a_i + M_y - a_i
 
 
 def column_segment(
@@ -73,7 +73,7 @@ def law(
     yields_1 = (m1 - a1) * copysign(1.0, rigid_1) >= M_y * ON_BOUND
     yields_2 = (m2 - a2) * copysign(1.0, rigid_2) >= M_y * ON_BOUND
     work = 0.0
-    left = 1.0  # share of the way that remains
+    left = 1.0  # share of the path that remains
     t11, t12, t22 = k11, k12, k11
     for _ in range(MOST_EVENTS):
         t11, t12, t22 = hinged_tangent(k11, k12, r, yields_1, yields_2)
@@ -156,7 +156,7 @@ def hinged_tangent(
 
 
 def share_until_yield(m: float, dm: float, bound: float) -> float:
-    """Return the share of the increment dm after which |m| reaches the bound; above 1: not reached."""
+    """Return the share of the increment dm after which |m| reaches the bound; above 1, it does not."""
     if dm == 0.0:
         return 2.0
     return max(0.0, (copysign(bound, dm) - m) / dm)

@@ -1,8 +1,8 @@
 """An element: a force law, its parameters, and the displacements that deform it.
 
 A law gives the force at the end of a step as a function of the deformation there. It is
-written in the compilable subset, and nothing else needs to know about it: a structure
-compiles the laws of the elements that it is built from.
+written in the compilable subset and needs no registration: a structure compiles the laws of
+its own elements.
 
 An element of one row has one deformation d = row . x and the law
 
@@ -26,8 +26,8 @@ An element of two rows e and e + 1 has two deformations and one law for both,
 which writes force[e], force[e + 1], tangent[e], tangent[e + 1] and
 coupling[e] = d force[e]/d d[e + 1].
 
-A step may be repeated or divided, so a law keeps nothing but z. Two places of z are
-outputs of the structure; the places from OWN on belong to the law alone.
+A step may be repeated or divided, so z is the only memory of a law. Two places of z are
+outputs of the structure; the places from OWN on belong to the law.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from cosim import Array, DeclarationError
 #: places in the memory of a row
 YIELDING = 0  # 1 or -1 while the row yields in that direction, otherwise 0
 PLASTIC = 1  # plastic deformation
-OWN = 2  # first place that the law uses as it likes
+OWN = 2  # first place for the law's own memory
 
 #: force, tangent, stored, lost
 Response = tuple[float, float, float, float]
@@ -58,7 +58,7 @@ class Element:
     rows: Array  # (1, n) or (2, n): deformation for unit displacements
     parameters: tuple[float, ...]
     k0: float  # initial tangent; the stiffness matrix of the structure contains it
-    scale: float  # deformation of a size that matters: convergence is measured against it
+    scale: float  # typical deformation, against which convergence is measured
     k0_coupling: float = 0.0  # initial tangent between the two rows
     memory: int = 1  # number of places from OWN on
 

@@ -3,8 +3,8 @@
     f = k (d - z),  |f| <= slip_force                           (1)
     z' = d' while |f| = slip_force and f d' > 0, otherwise 0    (2)
 
-z is the slip. The return to the bound is exact for a deformation that goes straight from
-d0 to d.
+z is the slip. The return to the bound is exact when the deformation goes straight from d0
+to d.
 """
 
 from __future__ import annotations

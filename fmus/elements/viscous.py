@@ -15,7 +15,7 @@ from cosim import Array
 from .element import OWN, Element, Response
 
 FORCE = OWN  # force at the end of the step, N
-SCALE = 1e-3  # m; the law has no deformation of its own, and convergence needs one
+SCALE = 1e-3  # m; convergence needs a typical deformation, which the law does not have
 
 
 def viscous(row: Array, c: float, exponent: float = 1.0, rate0: float = 1e-3) -> Element:

@@ -1,10 +1,10 @@
-"""A participant as an FMU in one call, from the cache where it was exported before.
+"""A participant as an FMU in one call, exported at most once: the file is kept in a cache.
 
     plant = as_fmu(Oscillator())
 
-The file is keyed by its contents: the compiled kernels, the start record, the
-declarations (their units and meanings stand in the modelDescription), and the exporter.
-Docstrings and comments of a plant are not part of the key.
+Its key is a hash of its contents: the compiled kernels, the start values, the declarations
+(the modelDescription lists their units and meanings), and the exporter. Comments of a plant
+are not part of the key.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from .link import warm_up
 
 @lru_cache(maxsize=1)
 def _exporter() -> bytes:
-    """Return a hash of the exporter's source, and of the compiler's options."""
+    """Return a hash of the source of the exporter and of the module that calls the compiler."""
     here = Path(__file__).parent
     files = [*sorted([*here.glob("*.py"), *here.glob("c/*")]), Path(c_compiler.__file__)]
     return hashlib.sha256(b"".join(f.read_bytes() for f in files)).digest()
 
 
 def cache_key(participant: Participant) -> str:
-    """Return a hash of all that the FMU of a participant depends on."""
+    """Return a hash of everything that determines the FMU of a participant."""
     variables = participant.variables.values()
     declared = [(v.name, v.kind, v.shape, v.unit, v.meaning, v.min, v.max, v.fixed) for v in variables]
     rate = getattr(participant, "sample_period", None)  # the default experiment follows from it
@@ -40,7 +40,7 @@ def cache_key(participant: Participant) -> str:
 
 
 def as_fmu(participant: Participant) -> FMU:
-    """Export a participant with the values it has now, and load the FMU; `FMU.source` is the participant."""
+    """Export a participant with its present values and load the FMU; `FMU.source` is the participant."""
     path = cache_directory() / "fmus" / cache_key(participant) / f"{type(participant).__name__}.fmu"
     if not path.exists():
         warm_up()

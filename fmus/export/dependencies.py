@@ -1,16 +1,16 @@
-"""Which element of which unknown depends on which known: ModelStructure of an FMU.
+"""Dependencies of unknowns on knowns, element by element: the ModelStructure of an FMU.
 
 `cosim.core.dependencies` reads the kernels and answers by variable: a superset, which is
-enough to order a run. An exported FMU tells its host which element depends on which, so
-that answer is refined here by running the model, where that is exact: the IR of the
-kernels compares no floating-point numbers, so the same instructions run whatever the
-values, and outputs are analytic functions of them (sums, products, quotients, functions
-of libm). An analytic function that does not depend on an element never changes with it;
-one that depends on it changes at almost every point. Points are drawn at random, and
-taken at zero too, where no large term hides a small change. Settable
-parameters are drawn as well, so that a coefficient that happens to be 0 counts.
+enough to order a run. An exported FMU states the dependencies of each element, so that
+answer is refined here by running the model. This is exact where the IR of the kernels
+compares no floating-point numbers: the same instructions run for all values, and outputs
+are analytic functions of them (sums, products, quotients, functions of libm). An analytic
+function that does not depend on an element never changes with it; one that depends on it
+changes at almost every point. Points are drawn at random, and taken at zero too, where no
+large term hides a small change. Settable parameters are drawn as well, so that a
+coefficient that happens to be 0 counts.
 
-Where numbers are compared (a saturation, a sign, a hysteresis), the answer by variable is kept.
+Where the IR compares numbers (a saturation, a sign, a hysteresis), the answer by variable is kept.
 """
 
 from __future__ import annotations
@@ -38,8 +38,6 @@ _ROUNDING = 1e-10
 #: more settable parameters than this are not probed
 _MOST_PARAMETERS = 200
 
-Evaluation = Callable[[Array, float], bool]
-
 
 @dataclass(frozen=True)
 class ModelStructure:
@@ -49,7 +47,7 @@ class ModelStructure:
         of outputs, states and derivatives on inputs and states
     initial
         of outputs and derivatives on inputs, states and parameters when initialisation ends;
-        an unknown that is missing may depend on all of them
+        a missing unknown may depend on all of them
     """
 
     derivative_of: Mapping[int, int]
@@ -96,7 +94,7 @@ def _slots(v: Variable) -> range:
 
 
 def _evaluation(participant: Participant, kernels: str) -> str:
-    """Return the IR of an evaluation; `initialize` is part of it if there are parameters to set."""
+    """Return the IR of an evaluation, which includes `initialize` if a parameter can be set."""
     names = ("derivatives", "outputs", *(["initialize"] if _settable(participant) else []))
     return "".join(body for name in names for body in reachable(kernels, name).values())
 
@@ -104,7 +102,7 @@ def _evaluation(participant: Participant, kernels: str) -> str:
 def _changes(
     participant: Participant, address: Callable[[str], int], unknown: list[int], known: list[int]
 ) -> dict[int, set[int]] | None:
-    """Return, for each unknown slot, the known ones that change it in a probe; None if a probe fails."""
+    """Return for each unknown slot the known slots that change it in a probe; None if a probe fails."""
     run = _runner(participant, address)
     changed = {slot: set[int]() for slot in unknown}
     slots = np.array(unknown)
@@ -114,17 +112,17 @@ def _changes(
     for probe in range(2 * _PROBES):
         base = _point(participant, generator, origin=probe % 2 == 0)
         t = generator.uniform(0.1, 1.0)
-        record = base.copy()
-        if not run(record, t) or not np.isfinite(record[slots]).all():
+        storage = base.copy()
+        if not run(storage, t) or not np.isfinite(storage[slots]).all():
             return None
-        before = record[slots]
+        before = storage[slots]
         for s in known:
-            record[ports], record[rest] = base[ports], base[rest]
-            record[s] = _moved(base[s], generator)
-            if not run(record, t):
+            storage[ports], storage[rest] = base[ports], base[rest]
+            storage[s] = _moved(base[s], generator)
+            if not run(storage, t):
                 return None
             # negated, so that NaN is a change
-            same = np.abs(record[slots] - before) <= _ROUNDING * np.abs(before)
+            same = np.abs(storage[slots] - before) <= _ROUNDING * np.abs(before)
             for slot in slots[~same]:
                 changed[int(slot)].add(s)
     return changed
@@ -135,23 +133,23 @@ def _moved(x: float, generator: np.random.Generator) -> float:
 
 
 def _point(participant: Participant, generator: np.random.Generator, *, origin: bool) -> Array:
-    """Return a record to probe at: inputs and states at zero or at random, parameters near their values."""
-    record = participant.memory.copy()
+    """Return a storage to probe at: inputs and states at zero or at random, parameters near their values."""
+    storage = participant.memory.copy()
     for v in participant.variables.values():
         here = slice(v.slot, v.slot + v.size)
         if v.kind in ("input", "state"):
-            record[here] = 0.0 if origin else generator.normal(size=v.size)
+            storage[here] = 0.0 if origin else generator.normal(size=v.size)
     for v in _settable(participant):
         here = slice(v.slot, v.slot + v.size)
-        moved = record[here] * generator.uniform(0.9, 1.1, v.size)
+        moved = storage[here] * generator.uniform(0.9, 1.1, v.size)
         moved += np.where(moved == 0.0, generator.uniform(0.1, 1.0, v.size), 0.0)
-        record[here] = np.clip(moved, v.min, v.max)
-    return record
+        storage[here] = np.clip(moved, v.min, v.max)
+    return storage
 
 
-def _runner(participant: Participant, address: Callable[[str], int]) -> Evaluation:
-    """Return a function that evaluates a record as the FMU does, and returns whether that succeeded."""
+def _runner(participant: Participant, address: Callable[[str], int]) -> Callable[[Array, float], bool]:
+    """Return a function that evaluates a storage as the FMU does and returns whether that succeeded."""
     prototype = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_double, ctypes.c_double)
     names = [n for n in ("initialize", "derivatives", "outputs") if n in participant.kernels]
     functions = [prototype(address(f"kernel_{name}")) for name in names]
-    return lambda record, t: not any(f(record.ctypes.data, t, 0.0) for f in functions)
+    return lambda storage, t: not any(f(storage.ctypes.data, t, 0.0) for f in functions)

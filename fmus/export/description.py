@@ -3,16 +3,16 @@
 Both versions share variables and their roles (`role`), units (`unit_definition`) and
 dependencies by element (dependencies.py). FMI 2.0 lists every element
 of an array as a scalar variable, `K[2,3]`; FMI 3.0 lists the array. A value reference is
-the slot in the record, of an array the first one.
+a slot in the storage; that of an array is its first slot.
 
-States are outputs (ports can be read), with exact start values; derivatives are local;
-locals and parameters that are fixed at export are not listed.
+States are outputs, since ports can be read, with exact start values; derivatives are
+local. Locals, and parameters that are fixed at export, are not listed.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,7 @@ from .link import ExportError, Model, fmi_name, is_listed
 
 @dataclass(frozen=True)
 class DefaultExperiment:
-    """Times that a host uses by default, and those of the reference result, in s."""
+    """Times in s that a host uses by default, and those of the reference result."""
 
     start: float = 0.0
     stop: float = 10.0
@@ -49,9 +49,7 @@ def role(v: Variable, participant: Participant) -> Role:
     """Return causality, variability and initial: outputs and derivatives are calculated, others exact."""
     changes = "continuous" if isinstance(participant, Continuous) else "discrete"
     return {
-        "input": Role(
-            "input", "continuous", None, True
-        ),  # a block samples inputs that may change at any time
+        "input": Role("input", "continuous", None, True),  # also of a block, which samples it
         "output": Role("output", changes, "calculated", False),
         "state": Role("output", changes, "exact", True),
         "derivative": Role("local", "continuous", "calculated", False),
@@ -71,29 +69,25 @@ class Element:
 
 
 def elements(participant: Participant, *, arrays: bool) -> list[Element]:
-    """Return the listed variables in record order, by element or with arrays as they are."""
-    return list(_elements(participant, arrays))
-
-
-def _elements(participant: Participant, arrays: bool) -> Iterator[Element]:
-    for v in participant.variables.values():
-        if not is_listed(v):
-            continue
+    """Return the listed variables in the order of the storage, by element or with whole arrays."""
+    found = []
+    for v in filter(is_listed, participant.variables.values()):
         name, r = fmi_name(v), role(v, participant)
         if arrays or not v.shape:
-            yield Element(name, v, v.slot, v.size, r)
+            found.append(Element(name, v, v.slot, v.size, r))
             continue
         for offset, index in enumerate(np.ndindex(*map(int, v.shape))):
             where = "[" + ",".join(str(i + 1) for i in index) + "]"
             indexed = f"{name[:-1]}{where})" if v.kind == "derivative" else name + where
-            yield Element(indexed, v, v.slot + offset, 1, r)
+            found.append(Element(indexed, v, v.slot + offset, 1, r))
+    return found
 
 
 # -------------------------------------------------------------------------- units
 
 
 def unit_definition(unit: str) -> tuple[dict[str, int], float, float]:
-    """Return exponents of the SI base units, factor and offset of a unit; pint knows them."""
+    """Return exponents of the SI base units, factor and offset of a unit."""
     try:
         found = definition(unit)
     except WiringError as error:
@@ -103,7 +97,7 @@ def unit_definition(unit: str) -> tuple[dict[str, int], float, float]:
 
 
 def unit_name(v: Variable) -> str | None:
-    """Return the unit as it is written in the FMU: as declared; of derivatives, "(m/s)/s" is "m/s^2"."""
+    """Return the unit that the FMU states: the declared one, but "m/s^2" for a derivative in "(m/s)/s"."""
     if v.kind != "derivative" or v.unit is None:
         return v.unit
     return f"{parse(v.unit):~C}".replace("**", "^").replace("dimensionless", "1")
@@ -114,7 +108,7 @@ def _add_units(parent: etree._Element, names: Iterable[str | None]) -> None:
     definitions = etree.SubElement(parent, "UnitDefinitions") if listed else None
     for name in listed:
         exponents, factor, offset = unit_definition(name)
-        attributes = {k: str(n) for k, n in exponents.items() if n}
+        attributes = {k: str(n) for k, n in exponents.items()}
         if factor != 1.0:
             attributes["factor"] = repr(factor)
         if offset != 0.0:
@@ -126,7 +120,7 @@ def _add_units(parent: etree._Element, names: Iterable[str | None]) -> None:
 
 
 def _common(participant: Participant, model: Model, interfaces: Iterable[str], token: str) -> etree._Element:
-    """Return the root with the interface elements that both versions have."""
+    """Return the root with the elements of the interfaces, which both versions have."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -190,7 +184,8 @@ def _double(x: float) -> str:
     return repr(float(x))
 
 
-def _text(root: etree._Element) -> bytes:
+def xml_text(root: etree._Element) -> bytes:
+    """Return an element as the text of a file."""
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
 
@@ -229,9 +224,9 @@ def fmi2_description(
         section = etree.SubElement(tree, tag) if unknowns else None
         for e in unknowns:
             unknown = etree.SubElement(section, "Unknown", index=str(index[e.slot]))
-            if (needed := known.get(e.slot)) is not None:  # None: on all, which a missing attribute means
+            if (needed := known.get(e.slot)) is not None:  # a missing attribute means all
                 unknown.set("dependencies", " ".join(str(index[s]) for s in needed))
-    return _text(root)
+    return xml_text(root)
 
 
 def fmi3_description(
@@ -241,7 +236,7 @@ def fmi3_description(
     interfaces: Iterable[str],
     experiment: DefaultExperiment,
 ) -> bytes:
-    """Return modelDescription.xml of FMI 3.0: arrays are arrays, dependencies are those of any element."""
+    """Return modelDescription.xml of FMI 3.0; an array depends on whatever one of its elements depends on."""
     root = _common(participant, model, interfaces, "instantiationToken")
     listed = elements(participant, arrays=True)
     owner = {e.slot + i: e.slot for e in listed for i in range(e.size)}
@@ -277,7 +272,7 @@ def fmi3_description(
             if None not in needed:
                 whole = sorted({owner[s] for slots in needed for s in slots or ()})
                 unknown.set("dependencies", " ".join(map(str, whole)))
-    return _text(root)
+    return xml_text(root)
 
 
 def _add_role(v: etree._Element, e: Element) -> None:

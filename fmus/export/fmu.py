@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from cosim import Block, Continuous, CosimError, Participant
+from cosim import Block, Continuous, Participant
 from cosim.codegen.c_compiler import Platform, host
 from cosim.codegen.kernels import lower
 
@@ -41,15 +41,15 @@ def export(
     interfaces: Iterable[str] | None = None,
     experiment: DefaultExperiment | None = None,
 ) -> Path:
-    """Write a participant, with the values it has now as start values, as a native FMU.
+    """Write a participant as a native FMU whose start values are its present values.
 
     platforms
-        names in `cosim.codegen.c_compiler.PLATFORMS`; that of this machine by default
+        names in `cosim.codegen.c_compiler.PLATFORMS`; the default is this machine's
     interfaces
         "ModelExchange", "CoSimulation" or both (the default; a Block has Co-Simulation only)
     experiment
-        default experiment of the FMU, and that of the reference result in it; by default 1000
-        steps of the block's sample period or of 10 ms
+        experiment that hosts and the reference result use; by default 1000 steps of the
+        block's sample period or of 10 ms
     """
     target = Path(path)
     name = type(participant).__name__
@@ -122,10 +122,10 @@ def _default_experiment(participant: Participant) -> DefaultExperiment:
 
 
 def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDescription.xml") -> None:
-    """Write a zip archive whose bytes depend on its contents only; make its folder if there is none.
+    """Write a zip archive, and its folder if necessary; the bytes depend on the contents only.
 
-    The archive appears under its name when it is complete, so several threads and processes may
-    write to one path.
+    The archive gets its name when it is complete, so several threads and processes may write to
+    one path.
     """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
@@ -146,12 +146,12 @@ def write_archive(path: Path, files: Mapping[str, bytes], first: str = "modelDes
 
 
 def _binaries(name: str, libraries: Mapping[Platform, bytes], fmi_version: str) -> dict[str, bytes]:
-    """Return the libraries by their place in the archive.
+    """Return the libraries by their path in the archive.
 
-    FMI 3.0 has a folder for each architecture. FMI 2.0 has one for each system, and FMPy looks
-    there on ARM as well. So for macOS the two libraries become one universal binary. Linux
+    FMI 3.0 has a folder for each architecture. FMI 2.0 has one for each operating system, where
+    FMPy looks on ARM as well, so the two libraries for macOS become one universal binary. Linux
     has no such format: linux64 holds x86_64 if that is among the platforms and aarch64
-    otherwise, and aarch64-linux holds the ARM library in any case.
+    otherwise, and aarch64-linux always holds the ARM library.
     """
     if fmi_version != "2.0":
         return {f"binaries/{p.name}/{name}{p.suffix}": library for p, library in libraries.items()}
@@ -175,6 +175,3 @@ def _universal(libraries: list[bytes]) -> bytes:
         body += library + bytes(-len(library) % (1 << alignment))
     head = struct.pack(">2I", 0xCAFEBABE, len(libraries)) + b"".join(table)
     return head + bytes(offset - len(head)) + body
-
-
-__all__ = ["CosimError", "DefaultExperiment", "ExportError", "export"]

@@ -43,7 +43,7 @@ class ExportError(CosimError):
 
 
 def find_platform(name: str) -> Platform:
-    """Return the platform of that name."""
+    """Return the platform with this name; raise ExportError for an unknown one."""
     if name not in PLATFORMS:
         raise ExportError(f"platform '{name}' is not known; choose from {', '.join(PLATFORMS)}")
     return PLATFORMS[name]
@@ -51,7 +51,7 @@ def find_platform(name: str) -> Platform:
 
 @dataclass(frozen=True)
 class Model:
-    """All parts of a library but the platform and the front end."""
+    """All that determines a library, except its platform and the front end."""
 
     identifier: str
     fmi_version: str
@@ -67,7 +67,7 @@ class Model:
 
 
 def front_end(fmi_version: str) -> str:
-    """Return the text of the front end, which the token of an FMU depends on."""
+    """Return the text of the front end, on which the token of an FMU depends."""
     return "".join(p.name + p.read_text() for p in [*_sources(fmi_version), *sorted(_FRONT_END.glob("*.h"))])
 
 
@@ -79,12 +79,12 @@ def build_model(participant: Participant, identifier: str, fmi_version: str, ker
     """Return the model of a participant whose kernels have been lowered to `kernels`."""
     start = participant.memory.astype("<f8")
     for name in participant.CACHE_KEYS:
-        start[participant.variables[name].slot] = 0.0  # no matrices of an earlier advance
+        start[participant.variables[name].slot] = 0.0  # matrices of an earlier step are not exported
     return Model(identifier, fmi_version, kernels, _table(participant, identifier), start.tobytes())
 
 
 def reachable(ir: str, kernel: str) -> dict[str, str]:
-    """Return a kernel and the functions that it calls, directly or not, with their IR."""
+    """Return a kernel and all functions that it calls, directly or indirectly, with their IR."""
     bodies = {m[1]: m[0] for m in re.finditer(r'^define\b[^@\n]*@"?([^"(\s]+)"?\(.*?^}', ir, re.M | re.S)}
     reached: dict[str, str] = {}
     waiting = [f"kernel_{kernel}"]
@@ -158,7 +158,7 @@ def fmi_name(v: Variable) -> str:
 
 
 def link(model: Model, platform: Platform) -> bytes:
-    """Return the shared library of a model for a platform, from the cache if it is there."""
+    """Return the shared library of a model for a platform, from the cache if possible."""
     headers = fmi_headers()
     ir = _hidden(model.kernels)
     parts: list[str] = [platform.target, *_FLAGS, model.token, ir]
@@ -187,9 +187,9 @@ def _compile(model: Model, platform: Platform, ir: str, headers: Path) -> bytes:
 
 
 def warm_up() -> None:
-    """Let the compiler build its runtime for this machine in the background, unless it has done so before.
+    """Let the compiler build its runtime for this machine in the background, unless the cache has it.
 
-    This takes most of the time of a first link, and goes on while kernels are compiled.
+    This takes most of the time of a first link, and runs while kernels are compiled.
     """
 
     def link_nothing() -> None:
@@ -204,6 +204,6 @@ def warm_up() -> None:
 
 
 def _unit(model: Model) -> str:
-    """Return all C code as one unit: with zones and kernels as constants a step is 1.4 times faster."""
+    """Return all C code as one unit; zones and kernels are constants then, and a step is 1.4 times faster."""
     front = [f'#include "{source.name}"' for source in _sources(model.fmi_version)]
     return "\n".join([f'#define MODEL_TOKEN "{model.token}"', model.table, *front, ""])

@@ -1,14 +1,13 @@
 """Reference result inside an FMU, after the layered standard FMI-LS-REF 1.0.0-alpha.1.
 
-FMPy runs the FMU that was just built over the first steps of its default experiment, in
-Co-Simulation if it has that, otherwise in Model Exchange by forward Euler. Every input
-swings by 1 (in its unit) about its start value, each at another frequency; if the model
-cannot be driven so, inputs are held. The archive has, under
-extra/org.fmi-standard.fmi-ls-ref:
+FMPy runs the new FMU over the first steps of its default experiment, in Co-Simulation if
+it has this interface, otherwise in Model Exchange by forward Euler. Every input swings by
+1 (in its unit) about its start value, each at a frequency of its own; if the model fails
+under these inputs, they are held. The files, under extra/org.fmi-standard.fmi-ls-ref:
 
     fmi-ls-manifest.xml    roles of the files
     experiments.xml        the experiment
-    stimuli.csv            inputs at every communication point (if there are inputs)
+    stimuli.csv            inputs at every communication point, if the model has any
     reference.csv          outputs at every communication point
 """
 
@@ -32,7 +31,7 @@ from lxml import etree
 from cosim import Array, Participant
 from cosim.fmi.instance.fmi2_log import callbacks
 
-from .description import DefaultExperiment, Element, elements
+from .description import DefaultExperiment, Element, elements, xml_text
 from .link import ExportError
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -46,7 +45,7 @@ _ABOUT = (
 def reference_files(
     fmu: Path, participant: Participant, experiment: DefaultExperiment, interfaces: Iterable[str]
 ) -> dict[str, bytes]:
-    """Run an FMU and return the files of the layered standard by their place in the archive."""
+    """Run an FMU and return the files of the layered standard by their path in the archive."""
     steps = max(1, min(_STEPS, math.floor((experiment.stop - experiment.start) / experiment.step + 1e-9)))
     time: Array = experiment.start + np.arange(steps + 1, dtype=np.float64) * experiment.step
     interface = "CoSimulation" if "CoSimulation" in interfaces else "ModelExchange"
@@ -70,11 +69,11 @@ def reference_files(
 
 
 def _run(fmu: Path, interface: str, participant: Participant, time: Array, h: float, stimuli: Array) -> Array:
-    """Return the outputs at `time`; the log of the FMU is part of the error if it stops."""
+    """Return the outputs at `time`; if the FMU fails, the error quotes its log."""
     said: list[str] = []
 
-    def log(*record: Any) -> None:
-        said.append(" ".join(x.decode(errors="replace") for x in record if isinstance(x, bytes)))
+    def log(*entry: Any) -> None:
+        said.append(" ".join(x.decode(errors="replace") for x in entry if isinstance(x, bytes)))
 
     with tempfile.TemporaryDirectory() as folder:
         description = read_model_description(str(fmu), validate=False)
@@ -86,7 +85,7 @@ def _run(fmu: Path, interface: str, participant: Participant, time: Array, h: fl
         except Exception as error:  # FMPy raises Exception itself
             why = " | ".join(said[-3:]) or str(error)
             raise ExportError(
-                f"the exported FMU {fmu.stem} does not run its default experiment: {why}"
+                f"the exported FMU {fmu.stem} fails in its default experiment: {why}"
             ) from error
         finally:
             if instance is not None:
@@ -97,7 +96,7 @@ def _run(fmu: Path, interface: str, participant: Participant, time: Array, h: fl
 def _simulate(
     instance: Any, interface: str, participant: Participant, time: Array, h: float, stimuli: Array
 ) -> Array:
-    """Set inputs, step, get outputs; Model Exchange by forward Euler."""
+    """Set inputs, step and get outputs; return the outputs by row."""
     old = hasattr(instance, "setupExperiment")  # FMI 2.0
     listed = elements(participant, arrays=not old)
     inputs = [e.slot for e in listed if e.variable.kind == "input"]
@@ -145,7 +144,7 @@ def _euler(instance: Any, participant: Participant, old: bool) -> Callable[[floa
 
 
 def _csv(columns: list[Element], time: Array, table: Array) -> bytes:
-    """Return a table with time in the first column; the digits are all there."""
+    """Return a table with time in the first column, each number with all its digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["time", *(e.name for e in columns)])
@@ -167,7 +166,7 @@ def _experiments(experiment: DefaultExperiment, time: np.ndarray, stimulated: bo
     if stimulated:
         etree.SubElement(element, "Stimuli", type="text/csv", source="stimuli.csv")
     etree.SubElement(element, "References", type="text/csv", source="reference.csv")
-    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+    return xml_text(root)
 
 
 def _manifest(files: dict[str, bytes]) -> bytes:
@@ -192,4 +191,4 @@ def _manifest(files: dict[str, bytes]) -> bytes:
             root, "Related", type=kind, source=source, role=role, description=description,
             checksum=hashlib.sha3_256(data).hexdigest(), checksumType="SHA3-256",
         )  # fmt: skip
-    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+    return xml_text(root)

@@ -1,14 +1,14 @@
 """Complex modes of a classically damped structure with one attached damper.
 
 The structure is given in its own modal coordinates eta (normalised by mass, w_j = omega_j^2,
-d_j = 2 zeta_j omega_j); the damper m, c, k stands on the degree of freedom where the mode
-shapes are a_j, and x_m is its stroke:
+d_j = 2 zeta_j omega_j); the damper m, c, k is attached to the degree of freedom where the
+mode shapes are a_j, and x_m is its stroke:
 
     eta_j'' + d_j eta_j' + w_j eta_j = a_j (k x_m + c x_m' - u) + forces
     m (sum_j a_j eta_j'' + x_m'') + c x_m' + k x_m = u                   the thesis' (2.19)
 
-Without eta there remains one scalar equation for the eigenvalues s, a secular equation as
-in divide-and-conquer eigensolvers. With d_j(s) = s^2 + d_j s + w_j, e(s) = m s^2 + c s + k:
+Elimination of eta leaves one scalar equation for the eigenvalues s, a secular equation as in
+divide-and-conquer eigensolvers. With d_j(s) = s^2 + d_j s + w_j, e(s) = m s^2 + c s + k:
 
     e(s) + m s^2 (c s + k) sum_j a_j^2 / d_j(s) = 0
 
@@ -22,9 +22,9 @@ inverted:
 
     phi' (2 s M + C) phi = n,   z' = s z + phi' f / n,   x = sum of phi z over all s.
 
-`scipy.linalg.eig` would give the same numbers, but this runs in a compiled kernel and so
-inside an exported FMU, whose damper and stiffness are set before initialisation. The tests
-compare both. All functions work on memory of the caller and allocate nothing.
+`scipy.linalg.eig` gives the same numbers, as the tests show, but this code runs in a compiled
+kernel and so inside an exported FMU, whose damper and stiffness are set before
+initialisation. All functions work on memory of the caller and allocate nothing.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _others(s: complex, skip: int, w: Array, d: Array, a: Array) -> tuple[comple
 def _residual(
     s: complex, i: int, w: Array, d: Array, a: Array, m: float, c: float, k: float
 ) -> tuple[complex, complex]:
-    """Return F(s), which is 0 at an eigenvalue, and F'(s); i is the nearest pole or -1.
+    """Return F(s), which is 0 at an eigenvalue, and F'(s); i is the nearest pole, or -1 for none.
 
     F = d_i (e + q H) + q a_i^2 with q = m s^2 (c s + k); d_i = 1 and no last term for i = -1.
     """

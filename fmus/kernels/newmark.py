@@ -2,8 +2,8 @@
 
     M x'' + C x' + K x + B (f(d) - k0 d) = p,   d = B' x                                 (1)
 
-K is the initial tangent of everything; f are the forces of the nonlinear elements, k0
-their initial tangents, and r = f - k0 d is the part of the forces beyond linear. The load
+K is the initial tangent of the whole structure; f are the forces of the nonlinear elements,
+k0 their initial tangents, and r = f - k0 d is the part of the forces beyond linear. The load
 p is held over the step, so constant average acceleration reads, with dx = x1 - x0,
 
     (4/h^2 M + 2/h C + K) dx = 2 p + 4/h M v0 - 2 K x0 - B (r0 + r1),  v1 = 2/h dx - v0  (2)
@@ -20,10 +20,10 @@ factors and F are found once for h and for h/2, h/4, ...
 If an element's tangent changes within a step, the mean force that the method sees over
 the step differs from the force along the path. Where this difference of work is more than
 `event_tolerance` of the energy in the structure, the step is taken again as two halves,
-and so on: bisection brackets the event. A step that does not converge is halved likewise.
+and so on: bisection brackets the event. A step that does not converge is halved as well.
 
-The functions work on the record of a `NonlinearStructure`, named s; its fields are
-declared there. `advance_with` compiles the force laws of the given elements into a step.
+The functions work on the variables of a `NonlinearStructure`, s, which declares them.
+`advance_with` compiles the force laws of the given elements into a step.
 
 Source: N. M. Newmark, A method of computation for structural dynamics, Journal of the
 Engineering Mechanics Division 85 (1959) 67-94, DOI 10.1061/JMCEA3.0000098.
@@ -51,7 +51,7 @@ LAST_DAMPING = 1.0 / 32.0  # Newton: the smallest share of a correction that is 
 
 
 def no_law(s: Any, e: int, h: float) -> tuple[float, float]:
-    """End the chain of laws: row e has none of its own (the second row of a pair)."""
+    """End the chain of laws, for the second row of a pair, which has no law of its own."""
     return 0.0, 0.0
 
 
@@ -73,7 +73,7 @@ def row_law(s: Any, e: int, h: float) -> tuple[float, float]:
 
 
 def pair_law(s: Any, e: int, h: float) -> tuple[float, float]:
-    """Evaluate rows e and e + 1 likewise, by a law of two rows."""
+    """Evaluate rows e and e + 1 in the same way, by a law of two rows."""
     if int(s.law[e]) != number:
         passed_on: tuple[float, float] = otherwise(s, e, h)
         return passed_on
@@ -111,7 +111,7 @@ def advance_with(laws: tuple[tuple[Law, int], ...]) -> Advance:
 
 
 def rebound(function: Callable[..., Any], **names: Any) -> Any:
-    """Return a copy of a function that sees other values under the given global names."""
+    """Return a copy of a function in which the given global names have other values."""
     return types.FunctionType(function.__code__, {**function.__globals__, **names}, function.__name__)
 
 
@@ -133,8 +133,8 @@ def prepare(s: Any, h: float) -> None:
             s.A_start, s.A_row, s.A, s.L_start, s.parent, level,
             s.L_row, s.L, s.D_inv, s.load, s.dx, s.path, s.fill,
         )  # fmt: skip
-        if bad > 0:
-            s.failed_pivot = bad
+        if bad > 0:  # not positive definite: NaN ends the run at the first step
+            s.D_inv[level, bad - 1] = nan
         for e in range(rows):
             for j in range(n):
                 s.dx[j] = 0.0
@@ -241,7 +241,7 @@ def trial(s: Any, h: float, level: int) -> float:
         newton_direction(s, level)
         before = left
         share = 1.0
-        for _ in range(6):  # a shorter correction where the full one makes it worse
+        for _ in range(6):  # a shorter correction where the full one increases the residual
             for e in range(rows):
                 s.d1[e] += share * s.correction[e]
             elements(s, h)
@@ -264,7 +264,7 @@ def event_error(s: Any) -> float:
 
 
 def accept(s: Any, h: float, level: int) -> None:
-    """Make the trial the present state, with the displacements that it implies and the energies."""
+    """Make the trial the present state, and update its displacements and energies."""
     n = s.M.shape[0]
     rows = s.k0.shape[0]
     for j in range(n):
@@ -329,7 +329,7 @@ def loads(s: Any) -> None:
 
 
 def advance(s: Any, t: float, h: float) -> None:
-    """Carry the structure from t to t + h, in as many bisections as the elements need."""
+    """Advance the structure from t to t + h, in as many bisections as the elements need."""
     if h != s.h_ready:
         prepare(s, h)
     loads(s)
@@ -396,7 +396,7 @@ def measure(s: Any) -> None:
     s.energy[3] = s.E_strain
     s.energy[4] = s.E_damping
     s.energy[5] = s.E_hysteretic
-    if s.failure[0] >= 0.0:  # reported at the last point; NaN from now on ends the run
+    if s.failure[0] >= 0.0:  # the last point reported it; NaN ends the run now
         for i in range(s.y.shape[0]):
             s.y[i] = nan
     s.failure[0] = s.failed_element

@@ -3,7 +3,7 @@
     P A P^T = L D L^T,   L unit lower triangular
 
 The ordering P and the pattern of L are found once in Python (`plan`). `factor` and `solve`
-are plain loops on arrays of the caller, so that they run inside a kernel. A is stored by the
+are plain loops on arrays of the caller, so they run inside a kernel. A is stored by the
 columns of its upper triangle (diagonal included), already permuted. A frame of 430 degrees
 of freedom has about 1,000 entries in L: a solution is then an order of magnitude cheaper
 than with a dense inverse.
@@ -26,7 +26,7 @@ from cosim import Array
 
 @dataclass(frozen=True)
 class Plan:
-    """Ordering and patterns; index arrays are float64 because records hold nothing else."""
+    """Ordering and patterns; index arrays are float64, the only type of a storage."""
 
     order: NDArray[np.intp]  # order[i] = original index of permuted index i
     A_start: Array  # (n + 1) start of each column of the upper triangle
@@ -44,7 +44,7 @@ class Plan:
 
 
 def plan(pattern: Array) -> Plan:
-    """Return a fill-reducing order and the patterns for a symmetric matrix with these non-zero entries."""
+    """Return a fill-reducing order and the patterns of a symmetric matrix with these non-zero entries."""
     n = len(pattern)
     filled = np.asarray(pattern, bool) | np.eye(n, dtype=bool)
     dominant = csc_matrix(filled.astype(float) + n * np.eye(n))
@@ -108,7 +108,7 @@ def factor(
         row[j] = 0.0
         fill[j] = L_start[j]
     for j in range(n):
-        # scatter column j; the way up the tree is the pattern of row j of L
+        # scatter column j; the path up the tree is the pattern of row j of L
         mark[j] = j
         top = n
         D = 0.0

@@ -15,8 +15,8 @@ on frequency, so a realisation is a root of R times independent processes: one i
 Gaussian numbers, which takes seconds for 900 s on 76 floors.
 
 The load is sampled every `sample_period` seconds and has zero mean; `FloorLoad` feeds it to a
-system, linear between the samples. The defaults are those of the study of the tall building,
-which stands in for a wind tunnel record that is not available.
+system, linear between the samples. The study of the tall building calibrated the defaults, in
+place of a wind tunnel record, which is not available.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from cosim.blocks.table_source import row_at
 
 @dataclass(frozen=True)
 class AcrossWind:
-    """Parameters of the load; the defaults are calibrated by the study of the tall building."""
+    """Parameters of the load."""
 
     speed: float = 47.25  # U_H, mean wind at the top, m/s
     exponent: float = 0.25  # alpha of the profile
@@ -67,11 +67,11 @@ def coherence_factor(R: Array) -> Array:
     """Return G = G' with G G = R for a positive semidefinite correlation matrix.
 
     The symmetric root is unique and smooth in R, unlike Cholesky's or that of the
-    eigenvectors: a small change of a parameter is a small change of the realisation.
+    eigenvectors, so a small change of a parameter changes the realisation little.
     """
     values, vectors = la.eigh(R)
     if values[0] < -1e-8 * values[-1]:
-        raise DeclarationError(f"wind: coherence matrix is not positive semidefinite ({values[0]:.2g})")
+        raise DeclarationError(f"wind: the coherence matrix is not positive semidefinite ({values[0]:.2g})")
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
@@ -89,8 +89,8 @@ def across_wind(
     wind = wind or AcrossWind()
     if sample_period <= 0.0 or duration < sample_period:
         raise DeclarationError(
-            f"across_wind: duration {duration} s and sample_period {sample_period} s must be "
-            "positive, and the duration at least one period"
+            f"across_wind: duration {duration} s and sample_period {sample_period} s must be above zero, "
+            "and the duration at least one period"
         )
     z = np.cumsum(heights)
     tributary = 0.5 * (heights + np.append(heights[1:], 0.0))
@@ -99,7 +99,7 @@ def across_wind(
     gap = np.abs(z[:, None] - z)
 
     samples = round(duration / sample_period) + 1
-    length = 2 * samples  # the record is half a period of the Fourier series
+    length = 2 * samples  # the load is half a period of the Fourier series
     f: Array = np.asarray(np.fft.rfftfreq(length, sample_period), float)
     rng = np.random.default_rng(seed)
     spectrum = np.zeros((len(f), len(z)), complex)

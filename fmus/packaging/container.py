@@ -1,18 +1,17 @@
 """Export of a system as one FMU: `export_container(system, "loop.fmu", step=0.01)`.
 
-The FMUs of the participants and their connections go into a container of
-fmu-manipulation-toolbox (`pip install structcosim[container]`), which steps them in C. Its
-steps are those of sampled coupling: in [t_k, t_{k+1}] it steps one FMU after the other, each
-with the last values of the others. So blocks come first, in the order of their connections,
-and read the plants' outputs at t_k; then the plants, each before those that drive it, so that
-all of them get values of t_k or of blocks. Unit conversions and late connections are small
-FMUs of their own.
+The FMUs of the components and their connections go into a container of
+fmu-manipulation-toolbox (`pip install structcosim[container]`), which steps them in C, one
+after the other, each with the latest values of the others. An order exists in which this is
+sampled coupling: first the blocks, in the order of their connections, which read the plants'
+outputs at t_k; then the plants, each before those that drive it, so that all of them receive
+values of t_k or of blocks. Unit conversions and late connections are small FMUs of their own.
 
-Variables are named `participant.variable`: all outputs, parameters, and the inputs that are not
-connected. At t_k the output of a plant is that at t_k; the output of a block is that at t_{k-1},
-from its last step. One thing differs from `simulate`, at t_0: an input of a plant has the value
-that its source has after initialisation, while in `simulate` it has its own start value until
-the first step. Outputs with feedthrough show it at t_0 if the two differ.
+Variables are named `component.variable`: all outputs, parameters, and unconnected inputs. At
+t_k the container shows a plant's output at t_k and a block's output at t_{k-1}, from its last
+step. It differs from `simulate` at t_0: an input of a plant has the value of its source after
+initialisation, while in `simulate` it keeps its own start value until the first step. Outputs
+with feedthrough show the difference at t_0.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ class Conversion(Block):
 
 
 class Late(Conversion):
-    """y = factor u + offset one step late; stepped before all others, when a block still has its last u"""
+    """y = factor u + offset, one step late; it is stepped first, when a block still has its last u"""
 
     of_block = Parameter(0.0, "1 if a block gives u, 0 if a plant does", fixed=True)
     kept = State(0.0, "u of the last step", shape="n")
@@ -78,10 +77,11 @@ def export_container(
     start: float = 0.0,
     fmi_version: str = "2.0",
 ) -> Path:
-    """Write a system as one Co-Simulation FMU that steps its participants every `step` seconds.
+    """Write a system as one Co-Simulation FMU that steps its components every `step` seconds.
 
-    A host's communication step is a multiple of `step`. What a container cannot say is refused:
-    blocks with another period than `step`, plants that drive each other, Model Exchange, texts.
+    A host's communication step must be a multiple of `step`. Raises ExportError for systems that a
+    container cannot express: blocks with another period than `step`, plants that drive each other,
+    Model Exchange, connections that carry text.
     """
     target = Path(path)
     _check(system, step)
@@ -121,7 +121,7 @@ def _with_conversions(system: System) -> tuple[System, list[str]]:
             after.setdefault(source, []).append(name)
         else:
             before.append(name)
-        # the order is made here: `initial` keeps the cycle that a late connection breaks from being refused
+        # `initial`: a late connection may close a cycle, which would be refused otherwise
         wired.connect(str(c.source), f"{name}.u", initial=None if c.initial is None else 0.0)
         wired.connect(f"{name}.y", str(c.target), transformation=(1.0, 0.0))
     blocks = [n for b in system.block_order() for n in (b, *after.get(b, []))]
@@ -130,23 +130,27 @@ def _with_conversions(system: System) -> tuple[System, list[str]]:
 
 def _check(system: System, step: float) -> None:
     for texts in system.text_connections:
-        raise ExportError(f"{texts.source} -> {texts.target} carries text, which a container cannot connect")
-    for name, member in system.participants.items():
-        if member.as_block:
-            period = member.sample_period or (member.every or 1) * step
+        raise ExportError(
+            f"{texts.source} -> {texts.target} carries text, which a container cannot connect; "
+            "export the system as an SSP"
+        )
+    for name, component in system.participants.items():
+        if component.as_block:
+            period = component.sample_period or (component.every or 1) * step
             if abs(period - step) > 1e-9 * step:
                 raise ExportError(
                     f"{name} acts every {period:g} s and the container steps all FMUs every {step:g} s; "
                     "export it with this step, or as an SSP"
                 )
-        if isinstance(member, FMU) and member.model_exchange:
+        if isinstance(component, FMU) and component.model_exchange:
             raise ExportError(
-                f"{name} is for Model Exchange, which a container would integrate by another method"
+                f"{name} is for Model Exchange, which a container integrates by a method of its own; "
+                "use its Co-Simulation interface, or export the system as an SSP"
             )
 
 
 def _order(system: System, blocks: list[str]) -> list[str]:
-    """Return the participants in the order of steps: blocks, then each plant before those that drive it."""
+    """Return the components in the order of their steps: blocks, then each plant before its drivers."""
     plants = [n for n in system.participants if n not in blocks]
     first: dict[str, set[str]] = {name: set() for name in plants}
     for c in system.connections:
@@ -158,8 +162,8 @@ def _order(system: System, blocks: list[str]) -> list[str]:
     except CycleError as error:
         names = " and ".join(dict.fromkeys(error.args[1]))
         raise ExportError(
-            f"{names} drive each other; in a container the one that is stepped last would get values of "
-            "t_k+1, not of t_k; export the system as an SSP"
+            f"{names} drive each other; in a container the last one would receive values of t_k+1 "
+            "instead of t_k; export the system as an SSP"
         ) from None
 
 
@@ -208,15 +212,15 @@ def _wire(container: Any, system: System, parts: dict[str, Part]) -> None:
     for link in container.links.values():
         link.name = f"connection.{link.name}"  # a local variable: not the name of the output
     for part in parts.values():
-        own = not isinstance(part.member, Conversion)
+        own = not isinstance(part.component, Conversion)
         for v in part.description.modelVariables if own else ():
             name, file = f"{part.name}.{v.name}", f"{part.name}.fmu"
             if v.causality == "output":
                 container.add_output(file, v.name, name)
             elif v.causality in ("input", "parameter") and (part.name, v.name) not in fed:
                 container.add_input(name, file, v.name)
-        if isinstance(part.member, FMU):
-            for name, values in part.member.start_values().items():
+        if isinstance(part.component, FMU):
+            for name, values in part.component.start_values().items():
                 container.add_start_value(f"{part.name}.fmu", name, " ".join(map(str, values)))
 
 
@@ -239,9 +243,10 @@ def _names(end: Port, port: FMUPort) -> list[str]:
 
 
 def _described(text: bytes, parts: dict[str, Part]) -> bytes:
-    """Return modelDescription.xml without the gaps and mistakes that the toolbox leaves.
+    """Return modelDescription.xml with the gaps and mistakes of the toolbox repaired.
 
-    Units; initial unknowns without exact ones, as FMI has it; no author, license or time of its own.
+    It gets units, loses initial unknowns whose start value is exact, as FMI requires, and loses
+    the author, license and time of the toolbox.
     """
     root = etree.fromstring(text)
     for name in ("author", "license", "copyright", "generationDateAndTime"):
@@ -262,7 +267,7 @@ def _described(text: bytes, parts: dict[str, Part]) -> bytes:
         if real is not None and unit in units.definitions and real.tag in ("Real", "Float64", "Float32"):
             real.set("unit", unit)
             used.add(unit)
-        if real is not None and (starts := v.findall("Start")):  # numbers have an attribute
+        if real is not None and (starts := v.findall("Start")):  # numbers have an attribute already
             v.set("start", " ".join(start.get("value") for start in starts))
             for start in starts:
                 v.remove(start)

@@ -1,9 +1,8 @@
-"""Import the tools of others that we compare with: ecos (C++) and OpenSees.
+"""Import of the tools that results are compared with: ecos (C++) and OpenSees.
 
-Their wheels need a shared library that the loader does not find on a bare machine, although a
-wheel from the same index contains it: `tbb` for ecospy, `openseespylinux` itself for openseespy.
-Loading that file first, with its symbols visible to all, is enough; a library of the system
-serves as well.
+Their wheels need a shared library that the loader does not find on a bare machine, although
+another wheel contains it: `tbb` for ecospy, `openseespylinux` for openseespy. Loading that
+file first, with its symbols visible to all, is enough; a library of the system works as well.
 """
 
 from __future__ import annotations

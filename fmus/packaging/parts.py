@@ -1,4 +1,4 @@
-"""The participants of a system as FMU files, for packages of any kind (SSP, container)."""
+"""The components of a system as FMU files, for packages of any kind (SSP, container)."""
 
 from __future__ import annotations
 
@@ -18,42 +18,41 @@ from ..export.fmu import export
 
 @dataclass
 class Part:
-    """A participant, its FMU file, and the declarations of the file."""
+    """A component, its FMU file, and the declarations of the file."""
 
     name: str
-    member: Component
+    component: Component
     file: bytes
     description: Any
-    #: the file's name; participants with the same file share one
+    #: the name of the file; components with equal files share one
     source: str = ""
     ports: dict[str, FMUPort] = field(default_factory=dict)
 
     def shape(self, variable: Any) -> Shape:
         """Return the shape of a variable of the FMU."""
-        return shape_of(variable, self.member.start if isinstance(self.member, FMU) else {})
+        return shape_of(variable, self.component.start if isinstance(self.component, FMU) else {})
 
 
 def fmu_parts(system: System, fmi_version: str, platforms: list[str] | None) -> dict[str, Part]:
-    """Export or read every participant's FMU; the same file goes in once."""
+    """Return the parts by name: every participant exported, every FMU read."""
     parts: dict[str, Part] = {}
     sources: dict[bytes, str] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for name, member in system.participants.items():
-            if isinstance(member, FMU):
-                file = member.path
+        for name, component in system.participants.items():
+            if isinstance(component, FMU):
+                file = component.path
             else:
-                assert isinstance(member, Participant)
+                assert isinstance(component, Participant)
                 file = Path(folder) / f"{name}.fmu"
                 try:
-                    export(member, file, fmi_version=fmi_version, platforms=platforms)
+                    export(component, file, fmi_version=fmi_version, platforms=platforms)
                 except CosimError as error:
                     raise type(error)(f"participant {name}: {error}") from error
-            part = Part(name, member, file.read_bytes(), read_description(file))
+            part = Part(name, component, file.read_bytes(), read_description(file))
             part.source = sources.setdefault(hashlib.sha256(part.file).digest(), f"{name}.fmu")
-            if isinstance(member, FMU):
-                texts = member.text_inputs | member.text_outputs
-                part.ports = member.input_ports | member.output_ports
-                part.ports |= {n: FMUPort(n, (), None, v.type, (v,)) for n, v in texts.items()}
+            if isinstance(component, FMU):
+                part.ports = component.input_ports | component.output_ports
+                part.ports |= component.text_inputs | component.text_outputs
             else:
                 part.ports = ports(part.description.modelVariables, part.shape)
             parts[name] = part

@@ -1,17 +1,17 @@
 """Export of a system as an SSP: `export_ssp(system, "loop.ssp", step=0.01, stop=20.0)`.
 
-    resources/NAME.fmu       every participant: an FMU is copied, a Block or Continuous exported
-    SystemStructure.ssd      connectors, connections, parameter values (SSV, in place), units
+    resources/NAME.fmu       every component: an FMU is copied, a participant is exported
+    SystemStructure.ssd      connectors, connections, parameter values (embedded SSV), units
 
 SSP 1.0 is written unless the system needs 2.0: arrays as connectors, or types of FMI 3.0.
-A conversion of units is written as a linear transformation that takes its place, so that a
-tool that knows no units computes the same. What SSP has no words for (which participants act
-as blocks, with which period, which connections are late, the step) is in annotations
-(cosim/ssp/format.py), with which `cosim.ssp.read_ssp` gives the system back.
+A conversion of units is written as a linear transformation, so that a tool that ignores units
+computes the same. SSP cannot express which components act as blocks and how often, which
+connections are late, and the step: these are annotations (cosim/ssp/format.py), from which
+`cosim.ssp.read_ssp` restores the system.
 
 Other masters exchange all values at the communication points and then step all FMUs (Jacobi),
-blocks as well: there, every FMU of a block between two others makes their loop one
-step later than it is in this system. README, "Systems out and in".
+blocks included: with them, every block between two other FMUs delays their loop by one more
+step than in this system.
 """
 
 from __future__ import annotations
@@ -47,10 +47,11 @@ from cosim.ssp.format import (
 )
 from cosim.system.system import Connection
 
+from ..export.description import xml_text
 from ..export.fmu import write_archive
 from .parts import Part, fmu_parts
 
-PARAMETER_SET = "parameters"  # one name for all: tools apply sets by name
+PARAMETER_SET = "parameters"  # one name for all sets, since tools apply sets by name
 #: the annotation that ecos and libcosim read
 _OSP = ("com.opensimulationplatform", "http://opensimulationplatform.com/SSP/OSPAnnotations")
 
@@ -68,18 +69,18 @@ def export_ssp(
     fmi_version: str | None = None,
     platforms: Iterable[str] | None = None,
 ) -> Path:
-    """Write a system as an SSP; participants start with the values that they have now.
+    """Write a system as an SSP; the start values of its components are their present values.
 
     step, stop, start
-        default experiment, in s; a package without one is run with `--step` and `--stop`
+        default experiment, in s; without it, `cosim run` needs `--step` and `--stop`
     coupling, solver
-        the coupling that `simulate` takes, if it is not sampled coupling; for our own reader
+        arguments of `simulate` for a coupling other than sampled; read by `read_ssp` only
     version
-        "1.0" or "2.0"; None takes 1.0 where it can express the system
+        "1.0" or "2.0"; by default 1.0 if it can express the system, otherwise 2.0
     fmi_version
-        version of the FMUs of Python participants: by default "2.0", in SSP 2.0 "3.0"
+        FMI version of exported participants: by default "2.0", in SSP 2.0 "3.0"
     platforms
-        names in `cosim.codegen.c_compiler.PLATFORMS` for these FMUs; that of this machine by default
+        names in `cosim.codegen.c_compiler.PLATFORMS` for these FMUs; the default is this machine's
     """
     if version is not None and version not in VERSIONS:
         raise SSPError(f"SSP version '{version}' is not supported; choose from {', '.join(VERSIONS)}")
@@ -90,7 +91,7 @@ def export_ssp(
     parts = fmu_parts(system, fmi_version, wanted)
     needs = _needs_2(system, parts)
     if version == "1.0" and needs:
-        raise SSPError(f"SSP 1.0 cannot say that {needs}; write version 2.0, or FMUs of FMI 2.0")
+        raise SSPError(f"SSP 1.0 cannot express that {needs}; write version 2.0, or FMUs of FMI 2.0")
     writer = _Writer(system, parts, version or ("2.0" if needs else "1.0"))
     target = Path(path)
     asked = {"step": None if step is None else repr(float(step)), "coupling": coupling, "solver": solver}
@@ -107,7 +108,7 @@ def _connections(system: System) -> list[Connection]:
 
 
 def _needs_2(system: System, parts: dict[str, Part]) -> str:
-    """Return the first thing that SSP 1.0 cannot express, as the end of a sentence, or nothing."""
+    """Return the first fact that SSP 1.0 cannot express, as the end of a sentence, or an empty text."""
     for c in _connections(system):
         for end in (c.source, c.target):
             port = parts[end.participant].ports[end.name]
@@ -118,9 +119,9 @@ def _needs_2(system: System, parts: dict[str, Part]) -> str:
             if port.variables[0].causality == "local":
                 return f"{end} is a local variable"
     for part in parts.values():
-        if isinstance(part.member, FMU):
-            for name, values in part.member.start_values().items():
-                variable = part.member.variables[name]
+        if isinstance(part.component, FMU):
+            for name, values in part.component.start_values().items():
+                variable = part.component.variables[name]
                 if len(values) != 1 or variable.type not in TYPES_1:
                     return f"{part.name}.{name} = {values} is a start value of type {variable.type}"
     return ""
@@ -140,11 +141,14 @@ class _Writer:
         self.enumerations: dict[str, list[tuple[str, int]]] = {}
 
     def document(self, name: str, start: float, stop: float | None, facts: dict[str, str]) -> bytes:
-        """Return the text."""
+        """Return the text of the file."""
         root = etree.Element(
             tag(SSD, "SystemStructureDescription"),
             {"version": self.version, "name": name, "generationTool": "structcosim"},
-            nsmap={**NAMESPACES, "osp": _OSP[1]},  # here: libcosim stumbles over one further down
+            nsmap={
+                **NAMESPACES,
+                "osp": _OSP[1],
+            },  # here: libcosim fails if it is declared lower
         )
         system = _add(root, SSD, "System", name=name)
         elements = _add(system, SSD, "Elements")
@@ -157,31 +161,31 @@ class _Writer:
         self._add_enumerations(root, SSD)
         self._add_units(root, SSD, self.units)
         self._experiment(root, start, stop, facts)
-        return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+        return xml_text(root)
 
     # ---------------------------------------------------------------------- components
 
     def _component(self, elements: etree._Element, part: Part) -> None:
-        member = part.member
+        component = part.component
         source = f"resources/{part.source}"
-        component = _add(elements, SSD, "Component", name=part.name, type=FMU_TYPE, source=source)
-        if isinstance(member, FMU) and member.interface is not None:
-            component.set("implementation", type(member.interface).__name__)
+        element = _add(elements, SSD, "Component", name=part.name, type=FMU_TYPE, source=source)
+        if isinstance(component, FMU) and component.interface is not None:
+            element.set("implementation", type(component.interface).__name__)
         connectors = self._connectors(part)
-        section = _add(component, SSD, "Connectors") if connectors else None
+        section = _add(element, SSD, "Connectors") if connectors else None
         for name, (port, kind) in connectors.items():
             connector = _add(section, SSD, "Connector", name=name, kind=kind)
             self._type(connector, port)
-        self._parameters(component, part)
-        facts = _facts(member)
+        self._parameters(element, part)
+        facts = _facts(component)
         if facts:
-            notes = _add(component, SSD, "Annotations")
+            notes = _add(element, SSD, "Annotations")
             _annotate(notes, "participant", facts)
             if "samplePeriod" in facts:
                 _osp_note(notes, "StepSizeHint").set("value", facts["samplePeriod"])
 
     def _connectors(self, part: Part) -> dict[str, tuple[FMUPort, str]]:
-        """Return all outputs, and the inputs and local variables that are connected."""
+        """Return all outputs, and the connected inputs and local variables."""
         used = {
             end.name for c in self.connections for end in (c.source, c.target) if end.participant == part.name
         }
@@ -206,12 +210,12 @@ class _Writer:
             for n in port.shape:
                 _add(connector, SSC, "Dimension", size=str(n))
 
-    def _parameters(self, component: etree._Element, part: Part) -> None:
-        """Write the parameter set of a component: parameters of a participant, start values of an FMU."""
+    def _parameters(self, parent: etree._Element, part: Part) -> None:
+        """Write the parameter set: parameters of a participant, start values of an FMU."""
         values = _values(part)
         if not values:
             return
-        binding = _add(_add(component, SSD, "ParameterBindings"), SSD, "ParameterBinding")
+        binding = _add(_add(parent, SSD, "ParameterBindings"), SSD, "ParameterBinding")
         inside = _add(binding, SSD, "ParameterValues")
         parameters = _add(inside, SSV, "ParameterSet", version=self.version, name=PARAMETER_SET)
         section = _add(parameters, SSV, "Parameters")
@@ -281,7 +285,7 @@ class _Writer:
             notes = _add(element, SSD, "Annotations")
             _annotate(notes, "delay", {"initial": " ".join(repr(float(x)) for x in late)})
 
-    # -------------------------------------------------------------------------- the end
+    # ------------------------------------------------------------ units and experiment
 
     def _add_enumerations(self, root: etree._Element, prefix: str) -> None:
         section = _add(root, prefix, "Enumerations") if self.enumerations else None
@@ -327,40 +331,40 @@ def _annotate(notes: etree._Element, name: str, facts: dict[str, str]) -> None:
     _add(note, OWN, name, **facts)
 
 
-def _facts(member: Component) -> dict[str, str]:
-    """Return our annotation of a participant, for what the standard does not express."""
+def _facts(component: Component) -> dict[str, str]:
+    """Return the attributes of a component's annotation: facts that the standard cannot express."""
     facts: dict[str, str] = {}
-    if member.as_block:
+    if component.as_block:
         facts["kind"] = "block"
-        if member.every is not None:
-            facts["every"] = str(member.every)
-        if member.sample_period is not None:
-            facts["samplePeriod"] = repr(member.sample_period)
-    if isinstance(member, FMU):
-        if isinstance(options := member.interface, ModelExchange):
+        if component.every is not None:
+            facts["every"] = str(component.every)
+        if component.sample_period is not None:
+            facts["samplePeriod"] = repr(component.sample_period)
+    if isinstance(component, FMU):
+        if isinstance(options := component.interface, ModelExchange):
             facts |= {} if options.solver is None else {"solver": options.solver}
             facts |= {} if options.substeps == 1 else {"substeps": str(options.substeps)}
             facts |= {} if options.tolerance is None else {"tolerance": repr(options.tolerance)}
-        facts |= {"eventMode": "true"} if member.event_mode else {}
-        facts |= {"isolated": "true"} if member.isolated else {}
+        facts |= {"eventMode": "true"} if component.event_mode else {}
+        facts |= {"isolated": "true"} if component.isolated else {}
     return facts
 
 
 def _values(part: Part) -> list[tuple[Any, list[Any]]]:
-    """Return variables of an FMU with the values of its parameter set."""
+    """Return the variables of a parameter set with their values."""
     variables = {v.name: v for v in part.description.modelVariables}
-    if isinstance(part.member, FMU):
-        return [(variables[n], values) for n, values in part.member.start_values().items()]
+    if isinstance(part.component, FMU):
+        return [(variables[n], values) for n, values in part.component.start_values().items()]
     found = []
     for v in variables.values():
         given = [] if v.causality != "parameter" or v.start is None else [float(x) for x in v.start.split()]
-        if given and np.isfinite(given).all():  # SSV cannot hold other numbers; the FMU has them
+        if given and np.isfinite(given).all():  # SSV cannot express infinity or NaN; the FMU has them
             found.append((v, given))
     return found
 
 
 def _text(value: Any, variable: Any) -> str:
-    """Return a value as SSV writes it."""
+    """Return a value as the text of an SSV attribute."""
     if isinstance(value, bytes):
         return value.hex()
     if variable.type == "Enumeration":

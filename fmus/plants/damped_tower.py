@@ -12,12 +12,12 @@ forces is exact:
     x = sum phi_i z_i,  x' = sum phi_i z_i',  x'' = sum phi_i lambda_i z_i'               (4)
 
 One mode of each complex pair is kept; the pair counts twice in (4), real parts only.
-Real and imaginary parts have variables of their own, with the suffixes _re and _im.
+Real and imaginary parts are separate variables, with the suffixes _re and _im.
 
-The modes are computed when the plant is initialised, from the modes of the structure
-alone and the parameters `stiffness`, m, c and k as they are then, so that an exported FMU
-has them as parameters. phi' w is computed again only when w has changed: a load that is
-sampled more coarsely than the communication step costs little.
+The modes are computed at initialisation, from the modes of the structure and the parameters
+`stiffness`, m, c and k, which an exported FMU therefore has as parameters. phi' w is computed
+again only when w has changed, so a load whose sample period is longer than the communication
+step costs little.
 
 Accelerations carry the force of the last step: at t_k they contain u held over
 [t_{k-1}, t_k].
@@ -91,16 +91,9 @@ class DampedTower(Continuous):
             self.stiffened[j] = self.stiffness * self.omega2[j]
             self.top[j] = self.shapes[n - 1, j]
         count = coupled_modes(
-            self.stiffened,
-            self.damping,
-            self.top,
-            self.m,
-            self.c,
-            self.k,
-            self.roots,
-            self.phi_re,
-            self.phi_im,
-        )
+            self.stiffened, self.damping, self.top, self.m, self.c, self.k,
+            self.roots, self.phi_re, self.phi_im,
+        )  # fmt: skip
         self.count = float(count)
         self.hold_step = 0.0
         for i in range(count, self.roots.shape[0]):
@@ -114,11 +107,11 @@ class DampedTower(Continuous):
                     im += self.shapes[dof, j] * self.phi_im[i, j]
                 self.in_re[dof, i], self.in_im[dof, i] = re, im
             self.in_re[n, i], self.in_im[n, i] = self.phi_re[i, n], self.phi_im[i, n]
-            members = 2.0 if self.roots[i, 1] > 0.0 else 1.0
+            weight = 2.0 if self.roots[i, 1] > 0.0 else 1.0
             for f in range(self.floors.shape[0] + 1):
                 dof = n if f == self.floors.shape[0] else int(self.floors[f]) - 1
-                self.out_re[i, f] = members * self.in_re[dof, i]
-                self.out_im[i, f] = members * self.in_im[dof, i]
+                self.out_re[i, f] = weight * self.in_re[dof, i]
+                self.out_im[i, f] = weight * self.in_im[dof, i]
         for j in range(n):
             self.w_seen[j] = math.nan
 
@@ -139,8 +132,8 @@ class DampedTower(Continuous):
         last = self.out_re.shape[1] - 1
         for f in range(last + 1):
             self.sums[0, f], self.sums[1, f], self.sums[2, f] = 0.0, 0.0, 0.0
-        # (4), two modes a pass, so that the sums are loaded and stored half as often; behind the last
-        # mode all is zero
+        # (4), two modes per pass, which halves the loads and stores of the sums; the coefficients after
+        # the last mode are zero
         for i in range(0, mode_count(self.count, self.roots), 2):
             root1_re, root1_im = self.roots[i, 0], self.roots[i, 1]
             root2_re, root2_im = self.roots[i + 1, 0], self.roots[i + 1, 1]
@@ -209,7 +202,7 @@ def mode_count(count: float, roots: Array) -> int:
 
 
 def project_forces(w: Array, seen: Array, in_re: Array, in_im: Array, count: int, g: Array) -> None:
-    """Write g = phi' w, unless w is still the w that was seen last."""
+    """Write g = phi' w, unless w has not changed since the last call."""
     n = w.shape[0]
     same = True
     for j in range(n):
@@ -220,7 +213,7 @@ def project_forces(w: Array, seen: Array, in_re: Array, in_im: Array, count: int
         return
     for i in range(count):
         g[0, i], g[1, i] = 0.0, 0.0
-    for j in range(0, n - 3, 4):  # four forces a pass: g is loaded and stored a quarter as often
+    for j in range(0, n - 3, 4):  # four forces per pass: a quarter of the loads and stores of g
         w0, w1, w2, w3 = w[j], w[j + 1], w[j + 2], w[j + 3]
         for i in range(count):
             g[0, i] += in_re[j, i] * w0 + in_re[j + 1, i] * w1 + in_re[j + 2, i] * w2 + in_re[j + 3, i] * w3

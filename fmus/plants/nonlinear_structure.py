@@ -10,8 +10,8 @@ Elements have one file each in fmus/elements; the step is Newmark's, with subste
     bearing = bilinear(row, k1, k2, dy)
     plant = NonlinearStructure.build(Structure(M, C, K, influence=I, ...), [bearing, ...])
 
-The elements have memory, so `advance` alone carries the structure on: there are no
-derivatives, and the plant is for sampled coupling and for Co-Simulation FMUs.
+The elements have memory, so the plant has an `advance` and no derivatives: it runs in sampled
+coupling, and as a Co-Simulation FMU.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class NonlinearStructure(Continuous):
     # entries of the upper triangle of K and of the factor L; n_levels step sizes h, h/2, h/4, ...
     M = Parameter(shape="n", meaning="lumped masses", unit="kg", min=0.0, fixed=True)
     K = Parameter(shape="n_A", meaning="stiffness, stored as in sparse_ldl.py", fixed=True)
-    C = Parameter(shape="n_A", meaning="damping, likewise", fixed=True)
+    C = Parameter(shape="n_A", meaning="damping, stored as K", fixed=True)
     A_start = Parameter(shape="n_1", meaning="first entry of each column of K and C", fixed=True)
     A_row = Parameter(shape="n_A", meaning="row of each entry", fixed=True)
     A_diagonal = Parameter(shape="n", meaning="place of the diagonal entries", fixed=True)
@@ -56,7 +56,7 @@ class NonlinearStructure(Continuous):
     law_parameters = Parameter(0.0, "parameters of the force laws", shape=("n_e", "n_p"), fixed=True)
     k0 = Parameter(0.0, "initial tangent", shape="n_e", fixed=True)
     k0_coupling = Parameter(0.0, "initial tangent with the next row", shape="n_e", fixed=True)
-    scale = Parameter(1.0, "deformation of a size that matters", shape="n_e", fixed=True)
+    scale = Parameter(1.0, "typical deformation", shape="n_e", fixed=True)
     tolerance = Parameter(1e-9, "Newton: largest residual over scale", unit="1", min=0.0)
     most_iterations = Parameter(30.0, "Newton: iterations before the step is halved", unit="1", min=1.0)
     event_tolerance = Parameter(
@@ -101,12 +101,11 @@ class NonlinearStructure(Continuous):
     failed_element = Local(-1.0, "element of the first failure")
     failed_time = Local(0.0, "its time", unit="s")
     failed_residual = Local(0.0, "its residual")
-    failed_pivot = Local(0.0, "1 + index of a pivot that is not positive")
 
     # factors and flexibility for h, h/2, h/4, ...
     CACHE_KEYS = ("h_ready",)
 
-    h_ready = Local(0.0, "step that they belong to", unit="s")
+    h_ready = Local(0.0, "step h of the factors", unit="s")
     A = Local(0.0, "4/h^2 M + 2/h C + K", shape="n_A")
     L_row = Local(0.0, "row of each entry of L", shape="n_L")
     L = Local(0.0, "factor by level", shape=("n_levels", "n_L"))
@@ -154,8 +153,8 @@ class NonlinearStructure(Continuous):
     ) -> Self:
         """Make the plant of a structure with elements.
 
-        structure   lumped masses; K with the initial tangents k0 of the elements in it
-        bisections  how often a step may be halved
+        structure   lumped masses; its K contains the initial tangents k0 of the elements
+        bisections  largest number of times that a step is halved
         values      start values of the plant's other parameters
         """
         M, C, K = np.diag(structure.M).copy(), structure.C, structure.K
@@ -217,7 +216,7 @@ def _with_laws(cls: type[NonlinearStructure], kinds: tuple[tuple[Law, int], ...]
 
 
 def _table(elements: Sequence[Element], n_e: int, kinds: tuple[tuple[Law, int], ...]) -> dict[str, Any]:
-    """Return the parameters of the plant that hold one row for each row of an element."""
+    """Return the parameters of the plant that have one entry for each row of an element."""
     parameters = np.zeros((n_e, max([1, *(len(e.parameters) for e in elements)])))
     law, k0, coupling, scale = np.full(n_e, NO_LAW), np.zeros(n_e), np.zeros(n_e), np.ones(n_e)
     first = 0
@@ -236,7 +235,7 @@ def _table(elements: Sequence[Element], n_e: int, kinds: tuple[tuple[Law, int], 
 
 
 def _check(structure: Structure, elements: Sequence[Element]) -> None:
-    """Refuse a structure that Newmark's method with these elements cannot take."""
+    """Refuse a structure that Newmark's method cannot integrate with these elements."""
     where, n = "NonlinearStructure", structure.dof
     masses = np.diag(structure.M)
     if np.abs(structure.M - np.diag(masses)).max() > 1e-9 * np.abs(masses).max():

@@ -7,10 +7,10 @@
 
 x is relative to the ground. Outputs: accelerations relative (x'') and absolute (x'' + a_g),
 drifts x_i - x_{i-1}, base shear q_1. The step is exact for inputs held over it
-(LinearContinuous). Masses and stiffnesses may be set before a run; the damping matrix
-follows from those that the building is made with, and stays:
+(LinearContinuous). Masses and stiffnesses may be set before a run; the damping matrix follows
+from their values at construction and does not change with them:
 
-    ShearBuilding.build(m, k, ratio)                      modal damping, one ratio or one for each mode
+    ShearBuilding.build(m, k, ratio)                      modal damping, one ratio for all modes or one each
     ShearBuilding.build(m, k, ratio, rayleigh=(1, 2))     C = a M + b K, `ratio` at two modes
 """
 

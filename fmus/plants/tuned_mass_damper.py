@@ -1,12 +1,12 @@
-"""An active tuned mass damper as a plant of its own (the thesis' (2.19)).
+"""An active tuned mass damper as a separate plant (the thesis' (2.19)).
 
     m y'' = u - k (y - x_top) - c (y' - v_top),  x_m = y - x_top
     reaction on the floor: k x_m + c x_m' - u
 
-y is the position of the mass in space. The damper is coupled to a building by motion
-(x_top, v_top) and force, each held over a communication step; the error against the one
-plant `DampedTower` falls with the step (the study of the tall building reports it). The
-step itself is exact for held inputs.
+y is the position of the mass in space. Motion (x_top, v_top) and force couple the damper to a
+building, each held over a communication step; the difference from the single plant
+`DampedTower` falls with the step, as the study of the tall building reports. The step itself
+is exact for held inputs.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ rotations of its ends from the chord by
     k11 = (4 + phi) EI / (L (1 + phi)),  k12 = (2 - phi) EI / (L (1 + phi))
     phi = 12 EI / (GA L^2), the share of shear in its flexibility
 
-Nodes have the degrees of freedom ux, uy, uz, rx, ry, rz; those that a node is not given
-are fixed.
+Nodes have the degrees of freedom ux, uy, uz, rx, ry, rz, or some of them; the others are
+fixed.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Section:
 
 
 def end_stiffness(EI: float, GA: float, L: float) -> tuple[float, float]:
-    """Return k11 and k12: moments of a unit rotation, at its own and at the other end."""
+    """Return k11 and k12, the moments at the rotated and at the other end for a unit rotation (N*m)."""
     phi = 12.0 * EI / (GA * L * L)
     return (4.0 + phi) * EI / (L * (1.0 + phi)), (2.0 - phi) * EI / (L * (1.0 + phi))
 

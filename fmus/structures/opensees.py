@@ -9,10 +9,10 @@
     bearing = bilinear(model.freedoms.row({(7, 1): 1.0, (3, 1): -1.0}), k1, k2, dy)
     plant = NonlinearStructure.build(structure, [bearing])
 
-A nonlinear element takes part with its initial tangent in K: put an elastic spring of
-that stiffness into the OpenSees model, or add k0 row' row to K. OpenSees gives the
-matrices through its integrator GimmeMCK; constraints are those of the handler
-`Transformation`. OpenSeesPy is not a dependency: the module is an argument.
+K must contain the initial tangent of every nonlinear element: put an elastic spring of that
+stiffness into the OpenSees model, or add k0 row' row to K. The matrices come from OpenSees'
+integrator GimmeMCK, with the constraint handler `Transformation`. OpenSeesPy is not a
+dependency: its module is an argument.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .structure import Freedoms, Structure, StructureError
 
 
 def opensees_model(ops: Any) -> Structure:
-    """Read the matrices of the model that the module `ops` (openseespy.opensees) holds."""
+    """Read the matrices of the present model of the module `ops` (openseespy.opensees)."""
     ops.wipeAnalysis()
     ops.constraints("Transformation")
     ops.numberer("Plain")

@@ -24,14 +24,14 @@ Direction = TypeVar("Direction")
 
 
 class StructureError(CosimError):
-    """Matrices that do not describe a structure, or not one that a plant can represent."""
+    """Matrices that do not describe a structure, or that a plant cannot represent."""
 
 
 class Freedoms(dict[tuple[Node, Direction], int]):
-    """Numbers of the degrees of freedom by node and direction; those that are fixed are missing."""
+    """Numbers of the degrees of freedom by node and direction; fixed ones are left out."""
 
     def row(self, weights: Mapping[tuple[Node, Direction], float]) -> Array:
-        """Return weights (n,) over all degrees of freedom; fixed ones are left out."""
+        """Return weights (n,) over all degrees of freedom; weights of fixed ones are ignored."""
         row = np.zeros(len(self))
         for freedom, weight in weights.items():
             if freedom in self:
@@ -49,7 +49,7 @@ class Freedoms(dict[tuple[Node, Direction], int]):
 
 @dataclass(frozen=True)
 class Structure:
-    """M, C, K (n, n) of (1); rows that are not given are empty (influence: columns)."""
+    """M, C, K (n, n) of (1); rows (columns of influence) are empty by default."""
 
     M: Array
     C: Array

@@ -17,15 +17,15 @@ Controllers
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from controllers.adaptive.scwnn import SCWNN
+from controllers.design.design_model import DesignModel
 from controllers.design.reduction import modal_state_space
-from controllers.design.state_space import StateSpace
 from controllers.laws.state_feedback import StateFeedback
 from controllers.laws.viscous_dampers import ViscousDampers
 from controllers.observers.kinematic_observer import KinematicObserver
@@ -47,7 +47,8 @@ Controller = Literal[
 STEP, STEP_UNCONTROLLED = 0.005, 0.002  # s
 DURATION = 100.0  # s, of every run: the thesis' T_t
 LIMIT = 1e6  # N
-DISPLACEMENT_RANGE, VELOCITY_RANGE = 0.33, 3.3  # m and m/s at 10 V
+#: kind of sensor -> port of the bridge, its unit, and the range at 10 V in that unit
+RANGES = {"displacement": ("stroke", "m", 0.33), "velocity": ("stroke_rate", "m/s", 3.3)}
 NOISE = 0.003  # of the range
 #: bearing displacements that the observer before the network measures: x, y of one bearing, x of
 #: another, at either end
@@ -102,8 +103,8 @@ def bridge_system(
 ) -> System:
     """Return the bridge under an earthquake, with a controller.
 
-    step: of the run, by default 2 ms without control and 5 ms with control; network: parameters
-    of the network, by default those of the controller.
+    `step` is the step of the run, s, by default 2 ms without control and 5 ms with control; `network`
+    gives parameters of the network, by default those of the controller.
     """
     if step is None:
         step = STEP_UNCONTROLLED if controller == "none" else STEP
@@ -127,46 +128,32 @@ def bridge_system(
     return system
 
 
-def _displacements(system: System, bearings: range | tuple[int, ...], seed: int, reader: str) -> None:
-    """Connect displacements at the bearings (0, 1, ...) through sensors."""
-    _sensors(system, "displacement", "stroke", bearings, DISPLACEMENT_RANGE, "m", seed, reader)
-
-
-def _sensors(
-    system: System,
-    name: str,
-    port: str,
-    bearings: range | tuple[int, ...],
-    reach: float,
-    unit: str,
-    seed: int,
-    reader: str,
-) -> None:
-    """Connect a port at the bearings through sensors with one range: noise, then conversion."""
+def _sensors(system: System, kind: str, bearings: Sequence[int], seed: int, reader: str) -> None:
+    """Connect a motion at the bearings (0, 1, ...) to a port through sensors: noise, then conversion."""
+    port, unit, reach = RANGES[kind]
     n = len(bearings)
     noise = MeasurementNoise(np.full(n, NOISE * reach), sample_period=STEP, seed=seed, unit=unit)
-    chain = {f"{name}_noise": noise, name: AnalogToDigital(np.full(n, reach), unit=unit)}
+    chain = {f"{kind}_noise": noise, kind: AnalogToDigital(np.full(n, reach), unit=unit)}
     measure(system, [f"bridge.{port}[{i + 1}]" for i in bearings], chain, reader)
 
 
 def _network(system: System, seed: int, parameters: Mapping[str, float]) -> None:
     system.add("control", SCWNN.design(BEARINGS, NODES, **parameters))
-    every = range(BEARINGS)
-    _displacements(system, every, seed, "control.x")
-    _sensors(system, "velocity", "stroke_rate", every, VELOCITY_RANGE, "m/s", seed + 1, "control.v")
+    _sensors(system, "displacement", range(BEARINGS), seed, "control.x")
+    _sensors(system, "velocity", range(BEARINGS), seed + 1, "control.v")
 
 
 def _network_behind_observer(system: System, bridge: NonlinearStructure, seed: int) -> None:
     rows = bridge.linear_model().actuators
     system.add("observer", KinematicObserver.design(rows, rows[list(SENSORS)]))
-    _displacements(system, SENSORS, seed, "observer.y")
+    _sensors(system, "displacement", SENSORS, seed, "observer.y")
     system.add("control", SCWNN.design(BEARINGS, NODES))
     system.connect("observer.x", "control.x")
     system.connect("observer.v", "control.v")
 
 
 def _lqg(system: System, bridge: NonlinearStructure, seed: int) -> None:
-    """LQG: bearings are weighted by (0.1 m)^-2, midspan by (0.05 m)^-2, forces by LIMIT^-2.
+    """Add LQG: weights are (0.1 m)^-2 for bearings, (0.05 m)^-2 for the midspan, LIMIT^-2 for forces.
 
     The observer takes two disturbances as white over 10 Hz: the ground, 1 m/s^2 rms in each
     direction, and the nonlinear part of the bearings' forces, UNMODELLED rms each.
@@ -181,19 +168,17 @@ def _lqg(system: System, bridge: NonlinearStructure, seed: int) -> None:
     weight = np.diag([0.1**-2.0] * BEARINGS + [0.05**-2.0] * (n - BEARINGS))
     seen = model.C[:n]
     R = np.eye(BEARINGS) / LIMIT**2
-    feedback = StateFeedback.lqr(model, seen.T @ weight @ seen, R)
     measured = list(LQG_SENSORS)
-    sensed = StateSpace(
+    sensed = DesignModel(
         A=model.A, B=model.B, E=np.hstack([model.E, model.B]),
         C=model.C[measured], D=model.D[measured], F=np.hstack([model.F, model.D])[measured],
     )  # fmt: skip
     unknown = np.diag([1.0**2] * 2 + [UNMODELLED**2] * BEARINGS) / (2.0 * 10.0)
-    noise = np.eye(len(measured)) * (NOISE * DISPLACEMENT_RANGE) ** 2 * STEP
-    observer = Observer.design(sensed, unknown, noise, STEP)
-    system.add("observer", observer)
-    system.add("regulator", feedback)
+    noise = np.eye(len(measured)) * (NOISE * RANGES["displacement"][2]) ** 2 * STEP
+    system.add("observer", Observer.design(sensed, unknown, noise, STEP))
+    system.add("regulator", StateFeedback.lqr(model, seen.T @ weight @ seen, R))
     system.add("limit", Saturation(np.full(BEARINGS, LIMIT)))
-    _displacements(system, LQG_SENSORS, seed, "observer.y")
+    _sensors(system, "displacement", LQG_SENSORS, seed, "observer.y")
     system.connect("observer.x_hat", "regulator.x_hat")
     system.connect("regulator.u", "limit.u")
     system.connect("limit.y", "observer.u_last", initial=0.0)

@@ -30,14 +30,13 @@ NAMES = tuple(f"J{i}" for i in range(1, 22))
 #: ports of the bridge that the criteria need
 PORTS = ("y", "a", "deformation", "force", "plastic", "u", "stroke", "stroke_rate", "energy", "failure")
 
-
 #: in the order of J1 to J6 and J9 to J14
 MOTIONS = ("shear", "moment", "midspan", "acceleration", "bearing", "curvature")
 
 
 @dataclass(frozen=True)
 class Equipment:
-    """What a controller needs: devices, sensors, and states of its own (None: no state vector)."""
+    """Numbers of devices, sensors and states of a controller (None: it has no state vector)."""
 
     devices: int
     sensors: int

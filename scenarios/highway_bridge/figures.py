@@ -13,12 +13,8 @@ from cosim import Array, Result
 from .bridge import EI, M_Y, SEGMENT
 from .criteria import BEARINGS, curvatures, moments
 
-#: ports of the bearings' displacements, and what they are of
-COMPARED = {
-    "none.deformation": "without control",
-    "lqg.deformation": "LQG",
-    "bridge.deformation": "this run",
-}
+#: ports of the bearings' displacements, and the names of their runs
+COMPARED = {"none.deformation": "without control", "lqg.deformation": "LQG", "bridge.deformation": "this run"}
 
 
 def figures(result: Result) -> dict[str, Figure]:
@@ -35,19 +31,18 @@ def figures(result: Result) -> dict[str, Figure]:
 
 
 def displacements(result: Result, sensor: int, name: str) -> Figure:
-    """Return the displacement at a sensor (0, 1, ...) in x and y, beside the runs to compare with."""
+    """Return the displacement at a sensor (0, 1, ...) in x and y, and that of the runs to compare with."""
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
     for direction, ax in enumerate(axes):
         for port, label in COMPARED.items():
             if port in result:
-                ax.plot(
-                    result.time, 1e3 * result[port][:, 2 * sensor + direction], linewidth=0.7, label=label
-                )
+                x = 1e3 * result[port][:, 2 * sensor + direction]
+                ax.plot(result.time, x, linewidth=0.7, label=label)
         ax.set_ylabel(f"{'xy'[direction]} displacement (mm)")
         ax.grid(alpha=0.3)
     axes[0].set_title(f"Bridge displacement at the position of the {name} sensor")
-    axes[0].legend(loc="upper right", fontsize="small")
+    _legend_below(figure, axes[0])
     axes[-1].set_xlabel("time (s)")
     axes[-1].set_xlim(0.0, _end_of_motion(result))
     return figure
@@ -65,8 +60,7 @@ def nodes(result: Result) -> Figure:
     figure = Figure(figsize=(7.0, 3.0), layout="constrained")
     ax: Axes = figure.subplots()
     ax.step(result.time, result["control.nodes"], where="post", linewidth=0.8)
-    ax.set_xlabel("time (s)")
-    ax.set_ylabel("wavelet nodes h(t)")
+    ax.set(xlabel="time (s)", ylabel="number of wavelet nodes")
     ax.grid(alpha=0.3)
     return figure
 
@@ -78,14 +72,13 @@ def loops(result: Result, phi: Array) -> Figure:
     deformation = result["bridge.deformation"][:, :BEARINGS]
     i = int(np.abs(deformation).max(axis=0).argmax())
     left.plot(1e3 * deformation[:, i], 1e-3 * result["bridge.force"][:, i], linewidth=0.6)
-    left.set_xlabel("deformation (mm)")
-    left.set_ylabel("force (kN)")
-    left.set_title(f"bearing {i // 2 + 1}, {'xy'[i % 2]}")
+    left.set(xlabel="deformation (mm)", ylabel="force (kN)", title=f"bearing {i // 2 + 1}, {'xy'[i % 2]}")
     j = int(np.abs(phi).max(axis=0).argmax())
     right.plot(1e3 * phi[:, j], 1e-6 * moments(result)[:, j], linewidth=0.6)
-    right.set_xlabel("curvature (1/km)")
-    right.set_ylabel("moment (MN·m)")
-    right.set_title(f"column {j // (phi.shape[1] // 2) + 1}")
+    column = j // (phi.shape[1] // 2) + 1
+    right.set(
+        xlabel="curvature (1/km)", ylabel="moment (MN·m)", title=f"column {column}, end that bends most"
+    )
     for ax in (left, right):
         ax.locator_params(axis="x", nbins=5)
         ax.grid(alpha=0.3)
@@ -107,9 +100,12 @@ def yield_map(phi: Array) -> Figure:
                     label=f"bending in {direction}" if k == 0 else None,
                 )  # fmt: skip
         ax.axvline(1.0, color="black", linewidth=0.8)
-        ax.set_title(f"column {c + 1}")
-        ax.set_xlabel("largest curvature / yield curvature")
+        ax.set(title=f"column {c + 1}", xlabel="largest curvature / yield curvature", xlim=(0.0, None))
         ax.set_ylabel("height above the base (m)")
-        ax.legend(fontsize="small")
         ax.grid(alpha=0.3)
+    _legend_below(figure, figure.axes[0])
     return figure
+
+
+def _legend_below(figure: Figure, axes: Axes) -> None:
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="small")

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+from numpy.typing import ArrayLike
 
 from cosim import Array
 from fmus.structures.structure import Structure, StructureError
@@ -45,10 +46,10 @@ ROOF_MASS = 747.1e3
 
 
 def cantilever_stiffness(heights: Array, bending_stiffness: Array) -> Array:
-    """Lateral stiffness (n, n), N/m, of a cantilever with massless floor rotations.
+    """Return the lateral stiffness (n, n), N/m, of a cantilever with massless floor rotations.
 
-    heights (n,) m and bending_stiffness (n,) N*m^2 by story. Hermite beam elements,
-    rotations condensed statically.
+    heights (n,) in m and bending_stiffness (n,) in N*m^2 are given by story; Hermite beam
+    elements, rotations condensed statically.
     """
     n = len(heights)
     full = np.zeros((2 * n + 2, 2 * n + 2))
@@ -63,16 +64,19 @@ def cantilever_stiffness(heights: Array, bending_stiffness: Array) -> Array:
     return np.asarray(0.5 * (K + K.T))
 
 
-def lumped_mass(heights: Array, mass_per_metre: Array, roof_mass: float) -> Array:
-    """Floor masses (n,), kg: half of the story below and above; the top floor also roof_mass."""
-    story_mass = heights * mass_per_metre
-    floors: Array = 0.5 * (story_mass + np.append(story_mass[1:], 0.0))
+def matrices(
+    bending_stiffness: ArrayLike, mass_per_metre: ArrayLike, roof_mass: float
+) -> tuple[Array, Array]:
+    """Return M and K (76, 76), kg and N/m, from bending stiffness and mass by section of the tower."""
+    stories = np.diff((0, *SECTION_TOPS))
+    story_mass = STORY_HEIGHTS * np.repeat(mass_per_metre, stories)
+    floors = 0.5 * (story_mass + np.append(story_mass[1:], 0.0))
     floors[-1] += roof_mass
-    return floors
+    return np.diag(floors), cantilever_stiffness(STORY_HEIGHTS, np.repeat(bending_stiffness, stories))
 
 
 def classical_damping(M: Array, K: Array, ratio: float = 0.01, constant_modes: int = 5) -> Array:
-    """C (n, n), N s/m: `ratio` of critical in the first modes, above them ratio * omega/omega_5."""
+    """Return C (n, n), N*s/m: `ratio` of critical in the first modes, ratio * omega/omega_5 above them."""
     omega2, shapes = la.eigh(K, M)
     omega = np.sqrt(omega2)
     zeta = ratio * np.maximum(1.0, omega / omega[constant_modes - 1])
@@ -80,35 +84,21 @@ def classical_damping(M: Array, K: Array, ratio: float = 0.01, constant_modes: i
     return np.asarray((left * (2.0 * zeta * omega)) @ left.T)
 
 
-def default_building(
-    heights: Array = STORY_HEIGHTS,
-    section_tops: tuple[int, ...] = SECTION_TOPS,
-    bending_stiffness: tuple[float, ...] = BENDING_STIFFNESS,
-    mass_per_metre: tuple[float, ...] = MASS_PER_METRE,
-    roof_mass: float = ROOF_MASS,
-    damping_ratio: float = 0.01,
-) -> Structure:
-    """The building without damper, 76 DOF; parameters by section of the tower."""
-    counts = np.diff((0, *section_tops))
-    if section_tops[-1] != len(heights):
-        raise StructureError(
-            f"default_building: the last section ends at story {section_tops[-1]}, "
-            f"but there are {len(heights)} story heights"
-        )
-    K = cantilever_stiffness(heights, np.repeat(bending_stiffness, counts))
-    M = np.diag(lumped_mass(heights, np.repeat(mass_per_metre, counts), roof_mass))
-    return Structure(M, classical_damping(M, K, damping_ratio), K)
+def default_building() -> Structure:
+    """Return the building without damper, 76 degrees of freedom."""
+    M, K = matrices(BENDING_STIFFNESS, MASS_PER_METRE, ROOF_MASS)
+    return Structure(M, classical_damping(M, K), K)
 
 
 def load_building(path: str) -> Structure:
-    """M, C, K of a .npz file with arrays M, K, C in t, kN s/m, kN/m (the benchmark's units)."""
+    """Return the building of a .npz file with arrays M, C, K in t, kN*s/m, kN/m (the benchmark's units)."""
     try:
         with np.load(path) as data:
             missing = {"M", "C", "K"} - set(data.files)
             if missing:
                 raise StructureError(
                     f"{path}: no array {sorted(missing)} (found {sorted(data.files)}); "
-                    "the file must hold M, C, K in t, kN s/m, kN/m"
+                    "the file must hold M, C, K in t, kN*s/m, kN/m"
                 )
             M, C, K = (1e3 * np.asarray(data[name], float) for name in ("M", "C", "K"))
             return Structure(M, C, K)
@@ -118,9 +108,9 @@ def load_building(path: str) -> Structure:
 
 @dataclass(frozen=True)
 class Damper:
-    """Active tuned mass damper on the top floor (2.19): kg, N s/m, N/m.
+    """Active tuned mass damper on the top floor (2.19): m in kg, c in N*s/m, k in N/m.
 
-    The printed c_m of 0.2 kN s/m is a slip of 1000: 20 % of critical is 201 kN s/m.
+    The printed c_m of 0.2 kN*s/m is a slip by a factor of 1000: 20 % of critical is 201 kN*s/m.
     """
 
     m: float = 500.0e3
@@ -129,12 +119,12 @@ class Damper:
 
 
 def with_damper(building: Structure, damper: Damper | None = None, stiffness: float = 1.0) -> Structure:
-    """Building and damper, n + 1 DOF; the last is x_m, relative to the top floor (2.19).
+    """Return building and damper, n + 1 degrees of freedom; the last is x_m, relative to the roof (2.19).
 
     In the symmetric form the equation of floor 76 is the sum of the rows 76 and 77 of
-    the printed matrices with the reaction added that the print omits (row 76 receives
-    k_m x_m + c_m x_m' - u). The force u of the actuator, which stands between
-    top floor and damper, then works on x_m alone: B_c = [0 ... 0 1]'.
+    the printed matrices, and the reaction that the print omits is added (row 76 receives
+    k_m x_m + c_m x_m' - u). The force u of the actuator between top floor and damper
+    then works on x_m alone: B_c = [0 ... 0 1]'.
     `stiffness` scales the building's K (1.15 and 0.85 are the thesis' cases).
     """
     damper = damper or Damper()

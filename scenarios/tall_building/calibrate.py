@@ -44,12 +44,10 @@ from .building import (
     BENDING_STIFFNESS,
     MASS_PER_METRE,
     ROOF_MASS,
-    SECTION_TOPS,
     STORY_HEIGHTS,
-    cantilever_stiffness,
     default_building,
     load_building,
-    lumped_mass,
+    matrices,
 )
 from .criteria import FLOOR_75, FLOOR_76, FLOORS, UNCONTROLLED
 from .plant import DURATION, SEED
@@ -66,30 +64,25 @@ def first_modes(M: Array, K: Array) -> tuple[Array, Array, Array]:
     return np.sqrt(omega2), shapes / shapes[-1], 1.0 / shapes[-1] ** 2
 
 
-def matrices(parameters: Array) -> tuple[Array, Array]:
-    """Return M and K of the nine numbers."""
-    counts = np.diff((0, *SECTION_TOPS))
-    EI, mass = parameters[:8].reshape(2, 4)
-    K = cantilever_stiffness(STORY_HEIGHTS, np.repeat(EI, counts))
-    M = np.diag(lumped_mass(STORY_HEIGHTS, np.repeat(mass, counts), float(parameters[8])))
-    return M, K
-
-
 def fit_building(target: Structure, start: Array = IN_USE) -> Array:
-    """Return the nine numbers, N m2, kg/m, kg."""
+    """Return the nine numbers in N*m^2, kg/m and kg."""
     omega, shapes, mass = first_modes(target.M, target.K)
 
     def residuals(logarithms: Array) -> Array:
-        w, s, m = first_modes(*matrices(np.exp(logarithms)))
+        w, s, m = first_modes(*_matrices(np.exp(logarithms)))
         return np.concatenate([100 * np.log(w / omega), 10 * np.log(m / mass), (s - shapes).ravel()])
 
     return np.asarray(np.exp(least_squares(residuals, np.log(start)).x))
 
 
+def _matrices(parameters: Array) -> tuple[Array, Array]:
+    return matrices(parameters[:4], parameters[4:8], parameters[8])
+
+
 def report_building(target: Structure, parameters: Array) -> str:
     """Return the remaining differences."""
     omega, shapes, mass = first_modes(target.M, target.K)
-    M, K = matrices(parameters)
+    M, K = _matrices(parameters)
     w, s, m = first_modes(M, K)
     mac = (s * shapes).sum(0) ** 2 / ((s * s).sum(0) * (shapes * shapes).sum(0))
     lines = ["mode  frequency  modal mass  1 - MAC"]
@@ -127,7 +120,7 @@ def responses(modes: Modes, load: Array) -> tuple[Array, Array]:
 
 
 def fit_wind(seed: int, modes: Modes, wind: AcrossWind | None = None) -> tuple[float, float, Array]:
-    """Return C_s, C_t, and the four figures (cm, cm/s^2) that they give."""
+    """Return C_s, C_t, and the four figures that they give, in cm and cm/s^2."""
     wind = wind or AcrossWind()
     parts = []
     for shedding, turbulence in ((1.0, 0.0), (0.0, 1.0)):

@@ -14,7 +14,7 @@ from .control import PERIOD
 from .study import Study
 
 DIVERGED = 1e4
-"""A larger stroke, in cm, is an instability that the run did not live to finish."""
+"""A stroke above this value, in cm, shows an instability."""
 
 
 def run_all(studies: Sequence[Study], workers: int = 0) -> list[dict[str, float] | None]:

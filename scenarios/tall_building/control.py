@@ -25,8 +25,8 @@ from typing import Literal
 
 import numpy as np
 
+from controllers.design.design_model import DesignModel
 from controllers.design.reduction import dominant_modes
-from controllers.design.state_space import StateSpace
 from controllers.laws.algorithm_1 import AlgorithmI
 from controllers.laws.algorithm_2 import AlgorithmII
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
@@ -63,7 +63,7 @@ class Weights:
     R: float = 0.0
     follow: tuple[float, float, float] | None = None
 
-    def matrix(self, model: StateSpace) -> Array:
+    def matrix(self, model: DesignModel) -> Array:
         """Return Q (12, 12) for the states of `reduced_model`: six displacements, six velocities."""
         floor_46, floor_76, damper = KEPT.index(46), KEPT.index(76), len(KEPT)
         velocity = len(KEPT) + 1  # from a displacement to its velocity
@@ -90,7 +90,7 @@ CONTINUOUS_RATE = 1.265
 """Rate of approach of the continuous sliding mode controller, 1/s; delta follows from it."""
 
 
-def reduced_model(building: Structure, damper: Damper | None = None) -> StateSpace:
+def reduced_model(building: Structure, damper: Damper | None = None) -> DesignModel:
     """Return the 12-state model of building and damper at nominal stiffness; x_m is relative."""
     coupled = with_damper(building, damper)
     top = building.dof
@@ -102,12 +102,12 @@ def reduced_model(building: Structure, damper: Damper | None = None) -> StateSpa
     return dominant_modes(coupled.M, coupled.C, coupled.K, force, floors, keep, measured)
 
 
-def tower_observer(model: StateSpace, S_vv: float = S_VV, period: float = PERIOD) -> Observer:
+def tower_observer(model: DesignModel, S_vv: float = S_VV, period: float = PERIOD) -> Observer:
     """Return the observer that all controllers share."""
     return Observer.design(model, np.eye(model.E.shape[1]), S_vv * np.eye(model.C.shape[0]), period)
 
 
-def add_controller(system: System, controller: Controller, model: StateSpace, a: float, delta: float) -> str:
+def add_controller(system: System, controller: Controller, model: DesignModel, a: float, delta: float) -> str:
     """Add the control law behind the observer; return the port of its force."""
     Q = SURFACE_WEIGHTS.matrix(model)
     law: Block
@@ -133,7 +133,7 @@ def add_controller(system: System, controller: Controller, model: StateSpace, a:
 def _gain_law(controller: Controller) -> Block:
     """Return a gain law of chapter 4; its M is a rate of s here, m/s^2, and a force in chapter 4."""
     if controller == "algorithm-1":
-        return AlgorithmI(M=0.1, M_min=0.001)
+        return AlgorithmI(M=0.1, M_min=0.001, unit="m/s^2")
     if controller == "algorithm-2":
-        return AlgorithmII(M=0.1, alpha=0.05, beta=0.5, M1=0.001, M2=0.3)
-    return EquivalentControlGain(M_0=0.1, tau=0.1)
+        return AlgorithmII(M=0.1, alpha=0.05, beta=0.5, M1=0.001, M2=0.3, unit="m/s^2")
+    return EquivalentControlGain(M_0=0.1, tau=0.1, unit="m/s^2")

@@ -1,4 +1,4 @@
-"""Damper and building as two FMUs that exchange motion and force: the error of the coupling.
+"""The error of the coupling between damper and building, two FMUs that exchange motion and force.
 
     damper.x_top, damper.v_top <- building.x[76], building.v[76]
     building.top               <- damper.reaction
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from .building import STORY_HEIGHTS, Damper
 from .plant import building, load
 
 Coupling = Literal["sampled", "iterated"]
-COUPLINGS: tuple[Coupling, ...] = ("sampled", "iterated")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)
 SPAN = 60.0
 
@@ -44,23 +43,21 @@ def coupling_errors(
     rows: list[dict[str, Any]] = []
     for step in steps:
         one = _run({"tower": DampedTower.build(structure, top, **asdict(Damper()))}, table, dt, step, span)
-        for coupling in COUPLINGS:
+        for coupling in get_args(Coupling):
             plants = {
                 "tower": ModalStructure.build(structure, top),
                 "damper": TunedMassDamper(**asdict(Damper())),
             }
             two = _run(plants, table, dt, step, span, coupling)
-            errors = [
+            x76, x_m = [
                 float(np.max(np.abs(one[a] - two[b])) / np.max(np.abs(one[a])))
                 for a, b in (("tower.x", "tower.x"), ("tower.x_m", "damper.x_m"))
             ]
             before = [r for r in rows if r["coupling"] == coupling]
             order = None
             if before:
-                order = math.log(before[-1]["x76"] / errors[0]) / math.log(before[-1]["step"] / step)
-            rows.append(
-                {"step": step, "coupling": coupling, "x76": errors[0], "x_m": errors[1], "order": order}
-            )
+                order = math.log(before[-1]["x76"] / x76) / math.log(before[-1]["step"] / step)
+            rows.append({"step": step, "coupling": coupling, "x76": x76, "x_m": x_m, "order": order})
     return rows
 
 
@@ -72,14 +69,9 @@ def _run(
     for name, plant in plants.items():
         system.add(name, as_fmu(plant))
     system.connect("load.w", "tower.w")
-    record = ["tower.x"]
     if "damper" in plants:
         system.connect("tower.x", "damper.x_top")
         system.connect("tower.v", "damper.v_top")
         system.connect("damper.reaction", "tower.top")
-        record.append("damper.x_m")
-    else:
-        record.append("tower.x_m")
-    return simulate(
-        system, step=step, stop=span, record=record, decimation=round(STEPS[0] / step), coupling=coupling
-    )
+    record, every = ["tower.x", f"{list(plants)[-1]}.x_m"], round(STEPS[0] / step)
+    return simulate(system, step=step, stop=span, record=record, decimation=every, coupling=coupling)

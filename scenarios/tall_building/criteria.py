@@ -58,31 +58,17 @@ class Power(Block):
         self.p = self.v * self.u
 
 
-@dataclass(frozen=True)
-class Reference:
-    """RMS and peak of displacement and acceleration of `FLOORS` without control, m and m/s^2."""
-
-    rms_x: Array
-    rms_a: Array
-    peak_x: Array
-    peak_a: Array
-
-    @classmethod
-    def of(cls, x: Statistics, a: Statistics) -> Reference:
-        """Take the values from the statistics of an uncontrolled run."""
-        return cls(x.rms, a.rms, x.peak, a.peak)
-
-    def figures(self) -> dict[str, float]:
-        """Return the four figures that the appendix prints, cm and cm/s^2."""
-        values = (self.rms_x[FLOOR_76], self.rms_a[FLOOR_75], self.peak_x[FLOOR_76], self.peak_a[FLOOR_75])
-        return {n: 100.0 * float(v) for n, v in zip(UNCONTROLLED, values, strict=True)}
+def uncontrolled_figures(uncontrolled: Mapping[str, Statistics]) -> dict[str, float]:
+    """Return the four figures of a run without control that the appendix prints, cm and cm/s^2."""
+    x, a = uncontrolled["tower.x"], uncontrolled["tower.a"]
+    values = (x.rms[FLOOR_76], a.rms[FLOOR_75], x.peak[FLOOR_76], a.peak[FLOOR_75])
+    return {n: 100.0 * float(v) for n, v in zip(UNCONTROLLED, values, strict=True)}
 
 
 @dataclass(kw_only=True)
 class TowerResult(Result):
     """A run, and the uncontrolled response to which its criteria refer."""
 
-    reference: Reference
     uncontrolled: Result
     controller: str
     profiles: dict[str, dict[str, Statistics]] = field(default_factory=dict)
@@ -91,20 +77,17 @@ class TowerResult(Result):
         """Return the 16 criteria; those that involve a force are zero for a run without force."""
         zero = Statistics(0.0, 0.0, 0.0, 0.0, 0.0)
         without_force = dict.fromkeys(("tower.x_m", "tower.u", "power.p"), zero)
-        return criteria(without_force | self.statistics, self.reference)
+        return criteria(without_force | self.statistics, self.uncontrolled.statistics)
 
 
-def criteria(statistics: Mapping[str, Statistics], reference: Reference) -> dict[str, float]:
-    """Return J1 to J12 and the four unnumbered criteria from the statistics of a run."""
-    x, a = statistics["tower.x"], statistics["tower.a"]
-    stroke, u, power = statistics["tower.x_m"], statistics["tower.u"], statistics["power.p"]
+def criteria(run: Mapping[str, Statistics], uncontrolled: Mapping[str, Statistics]) -> dict[str, float]:
+    """Return J1 to J12 and the four unnumbered criteria from the statistics of two runs."""
+    x, a, x_o, a_o = run["tower.x"], run["tower.a"], uncontrolled["tower.x"], uncontrolled["tower.a"]
+    stroke, u, power = run["tower.x_m"], run["tower.u"], run["power.p"]
     values = (
-        *_six(x.rms, a.rms, reference.rms_x, reference.rms_a, stroke.rms, power.rms),
-        *_six(x.peak, a.peak, reference.peak_x, reference.peak_a, stroke.peak, power.peak),
-        u.rms / 1e3,
-        100.0 * stroke.rms,
-        u.peak / 1e3,
-        100.0 * stroke.peak,
+        *_six(x.rms, a.rms, x_o.rms, a_o.rms, stroke.rms, power.rms),
+        *_six(x.peak, a.peak, x_o.peak, a_o.peak, stroke.peak, power.peak),
+        *(u.rms / 1e3, 100.0 * stroke.rms, u.peak / 1e3, 100.0 * stroke.peak),
     )
     return {name: float(v) for name, v in zip(NAMES, values, strict=True)}
 

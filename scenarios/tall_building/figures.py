@@ -48,7 +48,7 @@ def response(result: TowerResult) -> Figure:
         axes.plot(without.time, 100 * without[name][:, row], color="0.7", linewidth=0.6, label="no control")
         axes.plot(result.time, 100 * result[name][:, row], linewidth=0.7, label=result.controller)
         axes.set_ylabel(label)
-        axes.legend(loc="upper right", fontsize="small")
+    figure.legend(*x.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
     if "tower.u" in result:
         u.plot(result.time, result["tower.u"] / 1e3, linewidth=0.6)
     u.set(xlabel="time (s)", ylabel="control force (kN)")
@@ -74,7 +74,7 @@ def profile(result: TowerResult) -> Figure:
         strict=True,
     ):
         for name, statistics in result.profiles.items():
-            label_of = {"none": "no control", "lqg": "LQG"}.get(name, name)
+            label_of = {"none": "no control", "lqg": "LQG"}.get(name, result.controller)
             axes.plot(100 * getattr(statistics[port], kind), height, label=label_of)
         axes.set_xlabel(label)
         axes.grid(alpha=0.3)

@@ -1,10 +1,10 @@
-"""Building and wind of chapter 2, and the response without control; each is computed once per process."""
+"""Building and wind of chapter 2, and the response without control, each computed once per process."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
-from controllers.design.state_space import StateSpace
+from controllers.design.design_model import DesignModel
 from cosim import Array, CosimError, Result, System, simulate
 from fmus.loads.wind import FloorLoad, across_wind, load_forces
 from fmus.plants.modal_structure import ModalStructure
@@ -12,7 +12,7 @@ from fmus.structures.structure import Structure
 
 from .building import STORY_HEIGHTS, default_building, load_building
 from .control import PERIOD, reduced_model
-from .criteria import FLOORS, Reference
+from .criteria import FLOORS
 
 DURATION = 900.0
 """Length of a run, s."""
@@ -43,7 +43,7 @@ def load(wind: str | None, seed: int, duration: float, floors: int) -> tuple[Arr
 
 
 @lru_cache(maxsize=4)
-def model_of(data: str | None) -> StateSpace:
+def model_of(data: str | None) -> DesignModel:
     """Return the model on which the controllers are designed."""
     return reduced_model(building(data))
 
@@ -60,9 +60,3 @@ def uncontrolled(data: str | None, wind: str | None, seed: int, duration: float)
     step = PERIOD * LOAD_EVERY
     ports = ["tower.x", "tower.a"]
     return simulate(system, step=step, stop=duration, record=ports, decimation=10)
-
-
-def reference(data: str | None, wind: str | None, seed: int, duration: float) -> Reference:
-    """Return the response without control to which the criteria refer."""
-    statistics = uncontrolled(data, wind, seed, duration).statistics
-    return Reference.of(statistics["tower.x"], statistics["tower.a"])

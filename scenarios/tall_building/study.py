@@ -33,8 +33,8 @@ from scenarios.measurement import measure
 
 from .building import Damper
 from .control import PERIOD, Controller, add_controller, tower_observer
-from .criteria import FLOORS, LIMITS, UNITS, Power, TowerResult
-from .plant import DURATION, LOAD_EVERY, SEED, building, load, model_of, reference, uncontrolled
+from .criteria import FLOORS, LIMITS, UNITS, Power, TowerResult, uncontrolled_figures
+from .plant import DURATION, LOAD_EVERY, SEED, building, load, model_of, uncontrolled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,12 +164,10 @@ class Study:
             progress=progress,
             record=["load.w", *watched] if self.record else [],
         )
-        case = (self.data, self.wind, self.seed, self.duration)
         name = f"filtered SMC, a = {self.a:g}" if self.controller == "filtered-smc" else self.controller
         return TowerResult(
             **{f.name: getattr(result, f.name) for f in fields(Result)},
-            reference=reference(*case),
-            uncontrolled=uncontrolled(*case),
+            uncontrolled=uncontrolled(self.data, self.wind, self.seed, self.duration),
             controller=name,
             profiles=self._profiles() if self.profile else {},
         )
@@ -189,7 +187,7 @@ class Study:
     def metrics(self, result: TowerResult) -> dict[str, tuple[float, str]]:
         """Return the criteria, and the uncontrolled response to which they refer."""
         found = {name: (value, UNITS.get(name, "1")) for name, value in result.criteria().items()}
-        for name, value in result.reference.figures().items():
+        for name, value in uncontrolled_figures(result.uncontrolled.statistics).items():
             found[f"uncontrolled {name}"] = (value, "cm/s^2" if "_a" in name else "cm")
         return found
 

@@ -17,7 +17,7 @@ import pytest
 import scipy.linalg as la
 from fmpy.fmi2 import FMU2Slave
 
-from controllers.design.state_space import first_order
+from controllers.design.design_model import first_order
 from controllers.laws.sliding_mode import SlidingMode
 from cosim import FMU, simulate
 from scenarios.tall_building import plant as tower

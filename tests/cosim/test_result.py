@@ -45,7 +45,7 @@ def test_statistics_cover_every_point_whatever_is_recorded():
 
 
 @pytest.mark.parametrize("decimation", [1, 4, 7, 300, 1000])
-def test_decimation_takes_every_so_many_th_point(decimation):
+def test_decimation_takes_every_nth_point(decimation):
     full = simulate(loop(), step=0.01, stop=3.0)
     thin = simulate(loop(), step=0.01, stop=3.0, decimation=decimation)
     for name in full.signals:
@@ -124,7 +124,7 @@ def test_npz_keeps_every_bit(data, rows, interrupted, step):
             assert np.array_equal(getattr(kept, field), getattr(statistics[port], field))
 
 
-def test_csv_has_a_column_a_scalar_with_all_digits(tmp_path):
+def test_csv_has_one_column_per_scalar_with_all_digits(tmp_path):
     result = simulate(loop(), step=0.1, stop=0.7, record=["three.y", "plant.x", "three.M[2,1]"])
     result.save(tmp_path / "r.csv")
     header, *rows = (tmp_path / "r.csv").read_text().splitlines()
@@ -135,7 +135,7 @@ def test_csv_has_a_column_a_scalar_with_all_digits(tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 broken", None])
-def test_what_is_no_result_is_refused(tmp_path, content):
+def test_a_file_that_is_not_a_result_is_refused(tmp_path, content):
     path = tmp_path / "r.npz"
     if content is None:
         np.savez(path, x=np.ones(3))

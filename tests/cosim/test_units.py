@@ -1,4 +1,4 @@
-"""Units: which texts are units, and conversion by names and by definitions of a file's own."""
+"""Units: which texts are units, and conversion by names and by the definitions of a file."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_text_that_is_not_a_unit_is_refused(text):
 
 
 @given(st.text(alphabet="mskgN^*/.() 12-_%°", max_size=30))
-def test_any_text_is_a_unit_or_an_error_of_ours(text):
+def test_any_text_is_a_unit_or_a_cosim_error(text):
     for other in ("m", text[::-1]):
         try:
             scale, offset = conversion(text, other)

@@ -1,14 +1,14 @@
-"""An .fmu file: a ZIP archive from an untrusted source, checked before it is used.
+"""The archive of an .fmu file: a ZIP file from an untrusted source, checked before it is used.
 
     with Archive(Path("plant.fmu")) as archive:
         text = archive.read("modelDescription.xml")
         extraction = archive.extraction()          # extraction.folder, while the object exists
 
-All checks are made on the directory of the archive, before a byte is unpacked: names that
-leave the folder, links, two files of one name, encryption, compression that FMI does not
-have, and sizes that are too large for an FMU. Files are unpacked from a stream, which stops at the
-size that the directory declares and compares the checksum there; so declared sizes bound the
-actual ones, on the disk and in memory.
+The directory of the archive is checked before a byte is unpacked, for paths that lead out of the
+folder, links, two files of one name, encryption, compression methods outside FMI, and sizes that are
+too large for an FMU. Files are unpacked from a stream, which stops at the size that the directory
+declares and compares the checksum there; so declared sizes bound the actual ones, on the disk
+and in memory.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ MAX_ENTRIES = 200_000
 MAX_DIRECTORY = 300 * MAX_ENTRIES
 #: bytes unpacked; the largest FMUs known carry a few GB of tables and meshes
 MAX_UNPACKED = 32 * 2**30
-#: bytes unpacked that are allowed at any ratio, because they fill no disk
+#: bytes unpacked that are allowed at any ratio, because they do not fill a disk
 HARMLESS = 256 * 2**20
 #: unpacked over packed, above HARMLESS: tables of text reach 20, sparse matrices 100, a bomb of zeros 1000
 MAX_RATIO = 250
 #: bytes left free on the disk
 RESERVE = 256 * 2**20
-#: characters of a path; systems have 4096 and less, and a thousand nested folders are not removed again
+#: characters of a path; systems allow 4096 or fewer, and a thousand nested folders cannot be removed
 MAX_PATH = 1024
 #: bytes of an XML file; a million variables take some 300 MB
 MAX_XML = 2**30
@@ -52,11 +52,15 @@ _Returned = TypeVar("_Returned")
 
 
 class Archive:
-    """An open .fmu or .ssp file with sound entries; raises FMUError if they are not sound."""
+    """An open .fmu or .ssp file whose entries are sound.
+
+    The constructor raises FMUError if the file or an entry is not sound, and `read` and `extraction`
+    raise it if an entry cannot be unpacked.
+    """
 
     def __init__(self, path: Path, kind: str = "FMU") -> None:
         self.path = path
-        #: its kind for messages: "FMU" or "SSP"
+        #: "FMU" or "SSP", for messages
         self.kind = kind
         if not path.is_file():
             raise FMUError(f"there is no file {path}; give the path of an .{kind.lower()} file")
@@ -93,7 +97,7 @@ class Archive:
         return list(self._entries)
 
     def platforms(self) -> list[str]:
-        """Return the folders of binaries."""
+        """Return the names of the folders of binaries."""
         parts = (name.split("/") for name in self._entries)
         return sorted({p[1] for p in parts if p[0] == "binaries" and len(p) > 2})
 
@@ -116,7 +120,7 @@ class Archive:
             return stream.read(entry.file_size + 1)
 
     def extraction(self) -> Extraction:
-        """Return the folder with all files; FMUs of the same contents share one."""
+        """Return the folder with all files unpacked; archives with the same contents share it."""
         self._file.seek(0)
         digest = hashlib.file_digest(self._file, "sha256").digest()
         with _lock:
@@ -155,8 +159,8 @@ class Archive:
     def _check_directory_size(self) -> None:
         """Refuse a directory of too many entries before zipfile makes an object of each.
 
-        Its size is at byte 12 of the end record, or at byte 40 of the ZIP64 record, which precedes
-        it with its locator (APPNOTE.TXT, 4.3.14 to 4.3.16). The records are found as zipfile does.
+        Its size is at byte 12 of the end record, or at byte 40 of the ZIP64 record, which precedes it
+        together with its locator (APPNOTE.TXT, 4.3.14 to 4.3.16). The search is that of zipfile.
         """
         length = self._file.seek(0, os.SEEK_END)
         self._file.seek(max(0, length - 66_000))  # the records, and a comment of 65,535 at most

@@ -1,11 +1,11 @@
-"""Values given as text with a unit: start={"angle": "30 deg", "k": "2 kN/m"}.
+"""Start values as text with a unit: start={"angle": "30 deg", "k": "2 kN/m"}.
 
-A unit that the FMU declares as a display unit of the variable's own is converted by its definition,
+A display unit of the variable's own unit is converted by its definition in the FMU,
 
     shown = factor value + offset,  or, if it is inverse (FMI 3.0),  shown = factor / value
 
-and any other unit by pint. A relative quantity, such as a difference of temperatures, has
-no offset.
+and any other unit by pint. A relative quantity, such as a difference of temperatures, is converted
+without an offset.
 """
 
 from __future__ import annotations
@@ -58,9 +58,10 @@ def has_unit(text: str) -> bool:
 
 
 def without_units(where: str, port: FMUPort, units: Iterable[Any], value: Any) -> Any:
-    """Return a start value with texts such as "30 deg" turned into numbers in the port's unit.
+    """Return a start value in which texts such as "30 deg" are converted to numbers in the port's unit.
 
-    `units` are the unit definitions of the model description.
+    `units` are the unit definitions of the model description. Raises FMUError if a text must not
+    have a unit, or cannot be converted.
     """
     if isinstance(value, str):
         return _number(where, port, units, value)

@@ -1,6 +1,6 @@
-"""modelDescription.xml of an FMU: parsed strictly, validated by FMPy, and checked where FMPy is lenient.
+"""The model description of an FMU: parsed strictly, validated by FMPy, and checked where FMPy is lenient.
 
-FMPy parses the XML itself, with entities, and takes it from an archive or a file named .xml only. So
+FMPy parses modelDescription.xml with entities, and only from an archive or a file named .xml. So
 the text is parsed here first, and FMPy gets an archive in memory that contains nothing else.
 """
 
@@ -29,18 +29,21 @@ _CLOCK = {
 
 
 def read_description(path: Path) -> Any:
-    """Read and validate the model description of an FMU; return FMPy's object."""
+    """Return FMPy's object of the model description of an FMU, validated.
+
+    Raises FMUError if the file, or its model description, is not valid.
+    """
     with Archive(path) as archive:
         return description_of(archive)
 
 
 def description_of(archive: Archive) -> Any:
-    """Return FMPy's object of an archive's model description."""
+    """Return FMPy's object of the model description in an archive, validated."""
     return _validated(archive, parse(archive))
 
 
 def parse(archive: Archive) -> Any:
-    """Return the root element of modelDescription.xml of a supported FMI version."""
+    """Return the root element of modelDescription.xml; raise FMUError for other versions of FMI."""
     path, text = archive.path, archive.read("modelDescription.xml")
     # libxml2 bounds depth, sizes and the growth by entities, unless huge_tree is set
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
@@ -100,9 +103,9 @@ def _validated(archive: Archive, root: Any) -> Any:
 def _add_variability(root: Any) -> None:
     """Make variables other than reals discrete where their variability is missing, as in FMI 3.0.
 
-    In FMI 2.0 the default is "continuous" for all types, and only reals may be continuous, so that
-    other types must state it. Many files leave it out (pythonfmu's outputs, the Reference FMUs of
-    2019), and can only mean this.
+    In FMI 2.0 the default is "continuous" for all types, but only reals may be continuous, so that
+    other types must state their variability. Many files omit it (the outputs of pythonfmu, the
+    Reference FMUs of 2019), and can only mean "discrete".
     """
     for element in root.iterfind("ModelVariables/ScalarVariable"):
         is_signal = element.get("causality", "local") in ("local", "input", "output")
@@ -130,7 +133,7 @@ def _complete(root: Any, description: Any) -> None:
 
 
 def _check_structure(archive: Archive, root: Any, description: Any) -> None:
-    """Refuse references that pass FMPy's validation and would lead to another variable than meant."""
+    """Refuse references that pass FMPy's validation but would lead to a wrong variable."""
     path = archive.path
     n = len(description.modelVariables)
     if description.fmiVersion == "2.0":

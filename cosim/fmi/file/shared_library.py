@@ -11,16 +11,16 @@ _SUFFIXES = {"win": ".dll", "dar": ".dylib"}
 
 
 def library_name(platform: str, identifier: str) -> str:
-    """Return the path in the archive, such as binaries/linux64/plant.so."""
+    """Return the path of the library in the archive, such as binaries/linux64/plant.so."""
     system = platform.rpartition("-")[2][:3]
     return f"binaries/{platform}/{identifier}{_SUFFIXES.get(system, '.so')}"
 
 
 def check_library(path: Path) -> None:
-    """Refuse a truncated ELF library, because the system maps it and dies of SIGBUS at its end.
+    """Raise FMUError for a truncated ELF library, which would end this process with SIGBUS.
 
-    The loader itself refuses other files that are not libraries. Program headers, 64-bit
-    little-endian: type, flags, offset, virtual and physical address, size in the file, ...
+    The loader itself refuses other files that are not libraries. The fields of a program header of
+    64-bit little-endian ELF are type, flags, offset, virtual and physical address, size in the file.
     """
     try:
         with path.open("rb") as file:

@@ -1,46 +1,35 @@
 """A running FMU with Co-Simulation: doStep, and the events that interrupt it.
 
-A step of FMI 3.0 that returns early is continued, events are handled at their instants in event
-mode, and discrete inputs that changed are set at t_k (driver.py). All of this is Python, which
+A step of FMI 3.0 that returns early is continued; in event mode, events are handled at their
+instants and discrete inputs that changed are set at t_k (driver.py). All of this is Python, which
 the loop enters only if a step was interrupted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import replace
 from typing import Any
 
 from ...loop.fmi_operations import FMI2DoStep, FMI3DoStep
 from ...loop.operations import SLACK, Operation
-from ...loop.signals import RunSignals
 from ...result import SimulationError
-from ..fmu_file import FMUFile
-from .driver import DISCARD
+from .driver import DISCARD, Driver
 from .events import EventInstance
 from .timers import Timers
 
 
 class CoSimulationInstance(EventInstance):
-    """One instance of an FMU in a run, with Co-Simulation."""
+    """One instance of an FMU in a run, with Co-Simulation in steps of h, in s."""
 
-    def __init__(
-        self,
-        name: str,
-        fmu: FMUFile,
-        signals: RunSignals,
-        used: set[str],
-        h: float,
-        event_mode: bool,
-        isolated: bool,
-    ) -> None:
-        super().__init__(name, fmu, signals, used, event_mode, isolated)
-        self._timers = Timers(self.driver, fmu.clocks.values(), h)
-        self.event_mode = event_mode
+    def __init__(self, driver: Driver, used: Set[str], h: float) -> None:
+        super().__init__(driver, used)
+        self._timers = Timers(driver, self.fmu.clocks.values(), h)
 
     def start(self, t0: float) -> None:
         """Take the FMU through initialization and, in event mode, the events of the start."""
         super().start(t0)
-        if self.event_mode:
+        if self.driver.event_mode:
             self._start_events(t0)
 
     def _settle(self, t0: float) -> None:
@@ -50,7 +39,7 @@ class CoSimulationInstance(EventInstance):
         return self._timers.due(t)
 
     def step(self, fraction: float = 0.0) -> list[Operation]:
-        """Act as a block: set the inputs, step from t_k, get the outputs, which count at t_k."""
+        """Act as a block: set the inputs, step from t_k, get the outputs, which are valid at t_k."""
         stepped = (replace(op, fraction=fraction) for op in self.advance())
         read = [*self.read(), *self.read_texts()]
         return [*self.latch(), *stepped, *(replace(op, text="") for op in read)]
@@ -60,7 +49,7 @@ class CoSimulationInstance(EventInstance):
         common: dict[str, Any] = {
             "text": f"{self.name}: step (FMU)",
             "participant": self.name,
-            "function": self._function(f"{self.fmu.version.prefix}DoStep"),
+            "function": self.driver.address("DoStep"),
             "component": self._component,
         }
         answer = self.driver.answer

@@ -1,4 +1,4 @@
-"""Functions of an FMU in continuous-time mode, called from Python; the loop calls them by address."""
+"""The functions of continuous-time mode for calls from Python; the loop calls them by address."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from .driver import DISCARD, OK, WARNING, Driver
 
 
 class ContinuousTime:
-    """Sets time and states of a Model Exchange FMU, gets states, derivatives and event indicators.
+    """The time, states, derivatives and event indicators of a Model Exchange FMU.
 
-    Vectors are addresses of floats, or pointers to them. Every function raises
-    SimulationError with the log of the FMU when it fails.
+    Vectors are addresses of floats or pointers to them, with n_states or n_indicators values. Every
+    method raises SimulationError with the FMU's log if its function fails.
     """
 
     def __init__(self, driver: Driver, n_states: int, n_indicators: int) -> None:
@@ -22,18 +22,17 @@ class ContinuousTime:
         self.n_indicators = n_indicators
         #: the last time that was set, in s
         self.t = 0.0
-        prefix = driver.VERSION.prefix
-        self._set_time = self._function(f"{prefix}SetTime", ctypes.c_double)
+        self._set_time = self._function("SetTime", ctypes.c_double)
         vector = (ctypes.c_void_p, ctypes.c_size_t)
-        self._set_states = self._function(f"{prefix}SetContinuousStates", *vector)
-        self._get_states = self._function(f"{prefix}GetContinuousStates", *vector)
+        self._set_states = self._function("SetContinuousStates", *vector)
+        self._get_states = self._function("GetContinuousStates", *vector)
         self._get_derivatives = self._function(driver.VERSION.get_derivatives, *vector)
-        self._get_indicators = self._function(f"{prefix}GetEventIndicators", *vector)
-        self._get_nominals = self._function(f"{prefix}GetNominalsOfContinuousStates", *vector)
+        self._get_indicators = self._function("GetEventIndicators", *vector)
+        self._get_nominals = self._function("GetNominalsOfContinuousStates", *vector)
 
     def _function(self, name: str, *kinds: Any) -> Any:
-        address = ctypes.cast(getattr(self.driver.api.dll, name), ctypes.c_void_p).value or 0
-        return ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)(address)
+        kind = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
+        return kind(self.driver.address(name, in_loop=False))
 
     def _done(self, status: int, what: str) -> None:
         if status not in (OK, WARNING):
@@ -55,7 +54,7 @@ class ContinuousTime:
             self._done(self._get_states(self.driver.api.component, x, self.n_states), "get its states")
 
     def get_derivatives(self, target: Any) -> bool:
-        """Get the derivatives; return False if the model discards the call to ask for a smaller step."""
+        """Get the derivatives; return False if the model discards the call to request a smaller step."""
         status = self._get_derivatives(self.driver.api.component, target, self.n_states)
         if status == DISCARD:
             return False

@@ -1,4 +1,4 @@
-"""CVODE (SUNDIALS, from FMPy): variable step and order, for stiff models, with location of roots."""
+"""The integrator CVODE (SUNDIALS, from FMPy): variable step and order, for stiff models, with roots."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fmpy.sundials.sundials_context import SUNContext_PushErrHandler
 from ...result import SimulationError
 from .continuous_time import ContinuousTime
 
-#: tolerance of an internal step, as a fraction of the tolerance that is asked for
+#: tolerance of an internal step, as a fraction of the requested tolerance
 TIGHTER = 1e-3
 _LEAST = 1e-13  # a few hundred times the rounding of floats, the least tolerance of CVODE
 _ONE_STEP = 2  # CV_ONE_STEP: return after every internal step
@@ -36,7 +36,7 @@ def _free(function: str, *objects: Any) -> None:
 
 
 class Cvode(CVodeSolver):
-    """The backward differentiation formulas of CVODE for one model, a step of its own at a time.
+    """The backward differentiation formulas of CVODE for one model, one internal step at a time.
 
     Errors of the model are kept and raised when CVODE returns, because an exception in a
     callback from C would be printed and ignored.
@@ -44,8 +44,8 @@ class Cvode(CVodeSolver):
     CVODE controls the error of an internal step, and starts at order one. Restarted at
     every communication point, it takes many small steps there, whose errors add up over a
     run. So its steps are controlled TIGHTER than `tolerance`, at twice the work. (Van der
-    Pol, 20 s, 2000 restarts: tolerance 1e-6 leaves an error of 1e-2 without that, 2e-5 with it.)
-    The absolute tolerance of a state is its nominal value times the relative one.
+    Pol oscillator, 20 s, 2000 restarts, tolerance 1e-6: the error is 2e-5, and 1e-2 otherwise.)
+    The absolute tolerance of a state is its nominal value times the relative tolerance.
     """
 
     def __init__(self, model: ContinuousTime, t: float, tolerance: float) -> None:
@@ -70,7 +70,7 @@ class Cvode(CVodeSolver):
         SUNContext_PushErrHandler(self.sunctx, self.ehfun_, None)
 
     def __del__(self) -> None:
-        """Free what FMPy does not free, in the order of SUNDIALS: integrator, its parts, context."""
+        """Free the objects that FMPy leaves, in the order of SUNDIALS: integrator, its parts, context."""
         if not hasattr(self, "LS"):
             return
         super().__del__()
@@ -85,7 +85,7 @@ class Cvode(CVodeSolver):
         values[:] = np.where(stated & np.isfinite(values) & (values > 0.0), values, 1.0)
 
     def f(self, t: float, y: Any, ydot: Any, user_data: Any) -> int:
-        """Evaluate the derivatives: 0, 1 for another try with a smaller step, -1 for the end."""
+        """Evaluate the derivatives; return 0, 1 to request a smaller step, or -1 to stop."""
         try:
             self.model.set_time(t)
             target = NV_DATA_S(ydot)
@@ -100,7 +100,7 @@ class Cvode(CVodeSolver):
             return -1
 
     def g(self, t: float, y: Any, gout: Any, user_data: Any) -> int:
-        """Evaluate the event indicators: 0, or -1 for the end."""
+        """Evaluate the event indicators; return 0, or -1 to stop."""
         try:
             self.model.set_time(t)
             self.model.set_states(NV_DATA_S(y))
@@ -111,14 +111,14 @@ class Cvode(CVodeSolver):
             return -1
 
     def restart(self, t: float) -> None:
-        """Start anew at t from the states of the model, without memory of earlier steps."""
+        """Restart at t from the states of the model, without memory of earlier steps."""
         self.model.get_states(self.px)
         CVodeReInit(self.cvode_mem, t, self.x)
 
     def step(self, t: float, until: float) -> tuple[float, bool]:
-        """Take one internal step, not past `until`; return the time reached and whether a root is there.
+        """Take one internal step, at most to `until`; return the time reached, and whether it is a root.
 
-        The model is left at that time, with its states set.
+        The model is then at that time, with its states set.
         """
         reached = ctypes.c_double(t)
         _set_stop_time(self.cvode_mem, until)
@@ -134,6 +134,6 @@ class Cvode(CVodeSolver):
     def _failure(self, flag: int, t: float) -> str:
         text = f": {self.error_info[3]}" if self.error_info else ""
         return (
-            f"{self.model.driver.name}: cvode cannot go on from t = {t:g} s (code {flag}{text}); look at the "
-            "inputs before that time, at the model's states for a singularity, or at the tolerance"
+            f"{self.model.driver.name}: cvode cannot continue from t = {t:g} s (code {flag}{text}); check "
+            "the inputs before that time, the model's states for a singularity, and the tolerance"
         )

@@ -1,9 +1,9 @@
-"""One instance of an FMU's code, driven call by call: what both versions of FMI have in common.
+"""The driver of one FMU instance, call by call: the part that both versions of FMI share.
 
 A run and the doctor use the same driver. It loads the library, takes the instance through
 initialization, iterates events, finishes steps that return early, and turns every failure into an
 error with the FMU's log. `api` is FMPy's object with the functions of FMI; fmi2.py and fmi3.py
-make the calls that the versions order differently. The order of calls:
+make the calls that differ between the versions. The order of calls:
 
     make (constructor), configure, initialize
     event mode after initialization, and at every event:
@@ -15,10 +15,12 @@ make the calls that the versions order differently. The order of calls:
 
 from __future__ import annotations
 
+import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import Any, ClassVar, Protocol
@@ -26,7 +28,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ...core.variables import Array
+from ...arrays import Array
 from ...errors import FMUError, WiringError
 from ...loop.operations import SLACK
 from ...loop.signals import RunSignals, ctrl_c
@@ -73,14 +75,9 @@ class StepAnswer:
         """Return the time at which a step until `until` ended."""
         return min(float(self.times[0]), until) if self.flags[1:].any() else until
 
-    def take(self, event: bool, terminate: bool, early: bool, last: float) -> None:
-        """Keep what FMPy's doStep returned."""
-        self.flags[:] = event, terminate, early
-        self.times[0] = last
-
 
 class Interrupts(Protocol):
-    """What the owner of a driver does when a step is interrupted; times in s."""
+    """The owner of a driver, which acts when a step is interrupted; times in s."""
 
     def handle_event(self, t: float, at_end: bool) -> None:
         """Handle an event at t, inside the step or at its end."""
@@ -88,12 +85,13 @@ class Interrupts(Protocol):
     def end_run(self, t: float, at_end: bool) -> None:
         """Note that the FMU asks at t to end the run."""
 
-    def is_interrupted(self) -> bool:
-        """Return whether Ctrl-C was pressed."""
-
 
 class Driver(ABC):
-    """An instance of an FMU of one FMI version."""
+    """An instance of an FMU of one FMI version.
+
+    Raises FMUError if the FMU cannot be loaded or instantiated, and WiringError if this process must
+    not have another instance of it.
+    """
 
     VERSION: ClassVar[Version]
 
@@ -110,13 +108,13 @@ class Driver(ABC):
         self.name = name
         self.signals = signals
         self.model_exchange = model_exchange
-        #: whether Co-Simulation handles events outside its steps
-        self.event_mode = event_mode
+        #: whether events are handled outside the steps: always with Model Exchange
+        self.event_mode = event_mode or model_exchange
         self.isolated = isolated
         self.messages: list[str] = []
         #: status of the call that ended the run
         self.status = OK
-        #: where doStep answers, from FMI 3.0 on
+        #: the answer of doStep, from FMI 3.0 on
         self.answer: StepAnswer | None = None
         #: (1,) time of the next time event, in s
         self.event_time: Array = np.array([np.inf])
@@ -159,15 +157,17 @@ class Driver(ABC):
             _ALONE[guid] = self
 
     def _load(self, library: Path) -> None:
-        identifier = self.interface.modelIdentifier
+        identifier, fmi = self.interface.modelIdentifier, self.VERSION.prefix
+        kind = f"FMU{fmi[-1]}{'Model' if self.model_exchange else 'Slave'}"
+        made = getattr(import_module(f"fmpy.{fmi}"), kind)  # not in the folder of an untrusted FMU
         try:
             if self.isolated:
                 self.process = Isolation(self.name, library, self.signals)
-                # FMPy joins it to the folder of binaries: joined to an absolute path, the folder vanishes
+                # FMPy joins it to the folder of binaries, which an absolute path replaces
                 identifier = str(support_library().with_suffix(""))
             # FMPy changes to the library's folder, a property of the process, and stays there if it fails
             with _LOADING, chdir(self.file.directory):
-                self.api: Any = self._class()(
+                self.api: Any = made(
                     guid=self.file.description.guid,
                     unzipDirectory=str(self.file.directory),
                     modelIdentifier=identifier,
@@ -180,13 +180,13 @@ class Driver(ABC):
             ) from error
 
     def make(self) -> None:
-        """Instantiate the FMU; also in place of an instance that was freed."""
+        """Instantiate the FMU, for the first time or again after the instance was freed."""
         try:
             self.attempt("instantiate", self._instantiate)
         except FMUError as error:
             if not self.interface.needsExecutionTool:
                 raise
-            tool = self.file.description.generationTool or "which it does not name"
+            tool = self.file.description.generationTool or "whose name it does not state"
             raise FMUError(
                 f"{error}\n{self.file.path.name} needs its tool ({tool}) to run; install it on this machine, "
                 "with a licence if it needs one"
@@ -197,22 +197,37 @@ class Driver(ABC):
         self.api.freeInstance()
 
     def close(self) -> None:
-        """Give up the instance, and end the process of an isolated FMU."""
+        """Release the instance, and end the process of an isolated FMU."""
         if _ALONE.get(self.file.description.guid) is self:
             del _ALONE[self.file.description.guid]
         if self.process is not None:
             self.process.close()
 
-    def function(self, name: str) -> Any:
-        """Return a function of FMI for the loop."""
+    def address(self, name: str, in_loop: bool = True) -> int:
+        """Return the address of a function of FMI, given its name without prefix.
+
+        `in_loop` selects the functions of an isolated FMU that only the loop of a run may call.
+        """
+        name = self.VERSION.prefix + name
         function = getattr(self.api.dll, name)
-        return function if self.process is None else getattr(self.api.dll, f"loop_{name}", function)
+        if in_loop and self.process is not None:
+            function = getattr(self.api.dll, f"loop_{name}", function)
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
 
-    # --------------------------------------------------- what the versions do differently
+    def initialize(
+        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
+    ) -> None:
+        """Initialize at t0, in s: `set_start` sets start values, `settle` runs in initialization mode."""
+        self._enter_initialization(t0, set_start)
+        settle()
+        self.attempt("exit initialization", self.api.exitInitializationMode)
 
-    @abstractmethod
-    def _class(self) -> Any:
-        """Return FMPy's class for the interface."""
+    def counts(self) -> tuple[int, int]:
+        """Return the number of continuous states and of event indicators."""
+        description = self.file.description
+        return int(description.numberOfContinuousStates), int(description.numberOfEventIndicators or 0)
+
+    # -------------------------------------------------- differences between the versions
 
     @abstractmethod
     def _instantiate(self) -> None:
@@ -223,22 +238,12 @@ class Driver(ABC):
         """Set structural parameters, right after the instance is made."""
 
     @abstractmethod
-    def initialize(
-        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
-    ) -> None:
-        """Go through initialization; `set_start` sets start values, `settle` runs in initialization mode."""
-
-    @abstractmethod
-    def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:
-        """Update once: again, end, nominals changed, states changed, next event is known, its time."""
-
-    @abstractmethod
-    def counts(self) -> tuple[int, int]:
-        """Return the number of continuous states and of event indicators."""
+    def _enter_initialization(self, t0: float, set_start: Callable[[], None]) -> None:
+        """Set the start values and enter initialization mode."""
 
     @abstractmethod
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
-        """Get values."""
+        """Get `count` values by get{access}; strings are str from both versions."""
 
     def asks_to_end(self) -> float | None:
         """Return the time that a discarded step reached if it was discarded to end the run, else None."""
@@ -252,9 +257,7 @@ class Driver(ABC):
         access = numbers[variable.type][0] if variable.type in numbers else variable.type
         setter = getattr(self.api, f"set{access}")
         shown = values[0] if len(values) == 1 else list(values)
-        self.attempt(
-            f"set {variable.name} = {shown}", lambda: setter([variable.valueReference], list(values))
-        )
+        self.attempt(f"set {variable.name} = {shown}", setter, [variable.valueReference], list(values))
 
     def enter_event_mode(self) -> None:
         """Enter event mode."""
@@ -265,9 +268,10 @@ class Driver(ABC):
 
         Returns whether the FMU asks to end the run; `event_time` is then the next one.
         """
+        update = getattr(self.api, self.VERSION.update_discrete_states)
         for _ in range(EVENT_ITERATIONS):
             exchange()
-            again, end, _, _, timed, time = self.attempt("update its discrete states", self.discrete_states)
+            again, end, _, _, timed, time = self.attempt("update its discrete states", update)
             if end or not again:
                 self.event_time[0] = time if timed else np.inf
                 return bool(end)
@@ -283,13 +287,14 @@ class Driver(ABC):
     # ------------------------------------------------------------- steps of Co-Simulation
 
     def do_step(self, t: float, h: float) -> None:
-        """Do one step, which may return early; from FMI 3.0 on, `answer` tells."""
-        done = self.attempt("do its step", lambda: self.api.doStep(t, h, False))
+        """Do one step from t over h, in s; from FMI 3.0 on it may return early, as `answer` then states."""
+        done = self.attempt("do its step", self.api.doStep, t, h, False)
         if self.answer is not None:
-            self.answer.take(*done)
+            self.answer.flags[:] = done[:3]
+            self.answer.times[0] = done[3]
 
     def finish_step(self, t: float, h: float, owner: Interrupts) -> None:
-        """Go on from the answer of a step over [t, t + h] until its end.
+        """Continue a step over [t, t + h] from its answer until its end.
 
         A step that returned early at t' is continued from there. In event mode, an event that ended
         it is handled at t', and a time event inside the step splits it.
@@ -307,10 +312,10 @@ class Driver(ABC):
             if now >= end - near:
                 answer.flags[:] = 0
                 return
-            if owner.is_interrupted():
+            if self.signals.interrupted:
                 raise KeyboardInterrupt
             event = float(self.event_time[0])
-            # a time event at the end, to rounding, is met at its own instant
+            # a time event at the end of the step, to rounding, is handled at its own instant
             before, until = now, event if now < event <= end + near else end
             self.do_step(before, until - before)
             now = answer.came_to(until)
@@ -330,7 +335,7 @@ class Driver(ABC):
 
     @property
     def takes_calls(self) -> bool:
-        """Whether functions may still be called: not after a fatal error, nor without a process."""
+        """Whether functions may still be called: not after a fatal error or the end of the process."""
         return self.status != FATAL and not self.is_gone
 
     def crash(self) -> str:
@@ -339,10 +344,14 @@ class Driver(ABC):
             return ""
         return f"{self.name} ({self.file.path.name}) {self.process.crash}"
 
-    def attempt(self, what: str, call: Callable[[], Any]) -> Any:
-        """Call a function of FMPy; an exception becomes an error with the FMU's log."""
+    def attempt(self, what: str, call: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function of FMPy and return its result.
+
+        Raises FMUError with `what` was attempted and the FMU's log, or SimulationError if an isolated
+        FMU crashed.
+        """
         try:
-            result = call()
+            result = call(*arguments)
         except Exception as error:  # FMPy raises FMICallException and bare Exception alike
             self.status = getattr(error, "status", self.status)
             if self.process is not None:
@@ -382,7 +391,7 @@ def _checked(call: Callable[..., Any], name: str, *arguments: Any) -> Any:
     """Make a call of FMPy; a negative status, which FMPy takes for success, is an error."""
     status = call(name, *arguments)
     if isinstance(status, int) and status < 0:
-        from fmpy.fmi1 import FMICallException  # loading FMPy takes 0.15 s, for runs without FMUs, too
+        from fmpy.fmi1 import FMICallException  # loading FMPy takes 0.15 s, in runs without FMUs, too
 
         raise FMICallException(function=name, status=status)
     return status

@@ -1,4 +1,4 @@
-"""The driver of an FMU's version."""
+"""The choice of the driver for an FMU's version."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ def load(
     event_mode: bool = False,
     isolated: bool = False,
 ) -> Driver:
-    """Load the library of an FMU and make an instance of it."""
+    """Load the library of an FMU, instantiate it under a name, and return its driver."""
     made = Driver2 if file.version is FMI2 else Driver3
     return made(file, name, model_exchange, signals, event_mode, isolated)

@@ -1,11 +1,11 @@
-"""A communication step of a Model Exchange FMU from Python, from event to event.
+"""The integration of a Model Exchange FMU over a communication step in Python, from event to event.
 
-    until the end of the step, to the next time event or to the end:
+    repeat, to the next time event or to the end of the step:
         integrate by one step of CVODE, or by a fixed-step method (tableaus.py) in equal substeps
         report the completed step to the model
         at a root, at a time event, or if the model asks for it: handle an event
 
-A time event is met exactly. Nothing is recorded at an event.
+Time events are met exactly. Nothing is recorded at an event.
 """
 
 from __future__ import annotations
@@ -16,28 +16,30 @@ from typing import Protocol
 import numpy as np
 
 from ...core.tableaus import TABLEAUS
-from ...core.variables import Array
 from ...loop.operations import SLACK
 from ...result import SimulationError
 from .continuous_time import ContinuousTime
 from .driver import Interrupts
 
-#: a number of internal steps and events, and the part of a step that they must at least cover
+#: a number of internal steps and events, and the part of a communication step that they must cover
 _PATIENCE, _LITTLE = 1000, 1e-8
 
 
 class Integrator(Protocol):
-    """An integrator of a model."""
+    """An integrator of a model; times in s."""
 
     def restart(self, t: float) -> None:
         """Start at t from the states of the model."""
 
     def step(self, t: float, until: float) -> tuple[float, bool]:
-        """Go on from t, at most to `until`; return the time reached, and whether a root is there."""
+        """Integrate from t, at most to `until`; return the time reached, and whether it is a root."""
 
 
 class RungeKutta:
-    """A fixed-step method, in equal substeps to the next event or the end of the step."""
+    """A fixed-step method, in equal substeps to the next event or the end of the step.
+
+    model_exchange.py makes the same steps of whole communication steps, for the compiled loop.
+    """
 
     def __init__(self, model: ContinuousTime, solver: str, substeps: int) -> None:
         self.model = model
@@ -51,7 +53,7 @@ class RungeKutta:
         self.model.get_states(self.x.ctypes.data)
 
     def step(self, t: float, until: float) -> tuple[float, bool]:
-        """Go from t to `until`."""
+        """Integrate from t to `until`."""
         h = (until - t) / self.substeps
         for j in range(self.substeps):
             self._substep(t + j * h, h)
@@ -62,7 +64,7 @@ class RungeKutta:
     def _substep(self, t: float, h: float) -> None:
         nodes, rows, weights = self.tableau
         for i, (node, row) in enumerate(zip(nodes, rows, strict=True)):
-            x = self.x + h * _weighted(row, self.slopes)
+            x = self.x + h * (np.asarray(row) @ self.slopes[:i])
             self.model.set_time(t + node * h)
             self.model.set_states(x.ctypes.data)
             if self.model.n_states and not self.model.get_derivatives(self.slopes[i].ctypes.data):
@@ -70,16 +72,11 @@ class RungeKutta:
                     f"{self.model.driver.name} has no derivatives at t = {t + node * h:g} s (it discards the "
                     'call); take a smaller step, or ModelExchange(solver="cvode")'
                 )
-        self.x += h * _weighted(weights, self.slopes)
-
-
-def _weighted(weights: tuple[float, ...], slopes: Array) -> Array:
-    total: Array = np.asarray(weights) @ slopes[: len(weights)]
-    return total
+        self.x += h * (np.asarray(weights) @ self.slopes)
 
 
 class EventSteps:
-    """Carries a model over communication steps.
+    """The integration of a model over communication steps.
 
     completed
         reports a completed step at t to the model, and whether t is the end of the communication
@@ -102,7 +99,7 @@ class EventSteps:
         self.next_event = model.driver.event_time
 
     def carry(self, t: float, h: float) -> None:
-        """Carry the model from t to t + h with its inputs as they are."""
+        """Carry the model from t to t + h with its inputs held."""
         end, steps, before = t + h, 0, t
         self.integrator.restart(t)
         while True:
@@ -122,7 +119,7 @@ class EventSteps:
                     self.integrator.restart(t)
             if t >= end:
                 return
-            if self.owner.is_interrupted():
+            if self.model.driver.signals.interrupted:
                 raise KeyboardInterrupt
             steps += 1
             if steps % _PATIENCE == 0:

@@ -1,45 +1,33 @@
-"""Event mode, as Model Exchange and Co-Simulation with event mode have it.
+"""Event handling of a running FMU: with Model Exchange, and with Co-Simulation in event mode.
 
-Discrete inputs that changed are set in event mode, and clocks that are due are activated;
-discrete states are updated until they no longer change; then the FMU gives the time of its next
-time event. Clocked variables are set and got while their clock is active.
+In event mode, discrete inputs that changed are set and clocks that are due are activated. The
+discrete states are then updated until they no longer change, and the FMU gives the time of its
+next time event. Clocked variables are set and got while their clock is active.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ...loop.operations import Call, Copy, Operation
-from ...loop.signals import RunSignals
 from ...result import SimulationError
-from ..fmu_file import FMUFile
+from .driver import Driver
 from .instance import FMUInstance, VariableGroup
 
 
 class EventInstance(FMUInstance):
-    """One instance of an FMU whose events are handled here."""
+    """One instance of an FMU, with the handling of its events."""
 
-    #: whether there is an event mode, the only one in which discrete inputs can be set
-    event_mode: bool = True
-
-    def __init__(
-        self,
-        name: str,
-        fmu: FMUFile,
-        signals: RunSignals,
-        used: set[str],
-        event_mode: bool = False,
-        isolated: bool = False,
-    ) -> None:
-        super().__init__(name, fmu, signals, used, event_mode, isolated)
+    def __init__(self, driver: Driver, used: Set[str]) -> None:
+        super().__init__(driver, used)
         #: (1,) time of the next time event, in s
-        self.event_time = self.driver.event_time
-        self._output_clocks = [c.reference for c in fmu.clocks.values() if c.is_output]
+        self.event_time = driver.event_time
+        self._output_clocks = [c.reference for c in self.fmu.clocks.values() if c.is_output]
 
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
@@ -52,11 +40,11 @@ class EventInstance(FMUInstance):
     # ---------------------------------------------------------------------- operations
 
     def latch(self) -> list[Operation]:
-        """Set the inputs; in event mode, those that can change at events only are set in an event."""
-        waiting = [x for x in self.inputs if self.event_mode and x.discrete]
+        """Set the inputs; discrete ones, where there is an event mode, in an event."""
+        waiting = [x for x in self.inputs if self.driver.event_mode and x.discrete]
         native = [op for x in self.inputs if x not in waiting for op in self._set_inputs(x)]
         forget = [self._scaled(x.last, x.last, 0.0) for x in self.outputs if x.is_clock]
-        if not self.event_mode:
+        if not self.driver.event_mode:
             return [*native, *self._latch_texts()]
         if not waiting and not self.fmu.clocks and not self.text_sources:
             return native
@@ -77,7 +65,7 @@ class EventInstance(FMUInstance):
     # -------------------------------------------------------------------------- events
 
     def _send(self, t: float, waiting: list[VariableGroup]) -> None:
-        """Make an event of discrete inputs that changed and of clocks that tick."""
+        """Handle an event if discrete inputs or texts changed, or clocks tick."""
         ticking = self._due(t)
         for x in waiting:
             if x.is_clock:
@@ -99,9 +87,7 @@ class EventInstance(FMUInstance):
         """Handle an event at t, inside a step or at its end; clocks may tick and inputs change."""
         self.driver.enter_event_mode()
         if ticking:
-            self.driver.attempt(
-                "activate its clocks", lambda: self.api.setClock(ticking, [True] * len(ticking))
-            )
+            self.driver.attempt("activate its clocks", self.api.setClock, ticking, [True] * len(ticking))
         for x in changed:
             self._set_now(x)
         self._set_texts(texts)
@@ -113,10 +99,6 @@ class EventInstance(FMUInstance):
     def end_run(self, t: float, at_end: bool) -> None:
         """Note that the FMU asks at t to end the run."""
         self.signals.ask_to_end(self.name, t, at_end)
-
-    def is_interrupted(self) -> bool:
-        """Return whether Ctrl-C was pressed."""
-        return self.signals.interrupted
 
     def _start_events(self, t0: float) -> None:
         """Handle the events of the start."""
@@ -131,11 +113,10 @@ class EventInstance(FMUInstance):
     def _set_now(self, x: VariableGroup) -> None:
         x.last[:] = x.raw
         setter = getattr(self.api, f"set{x.access}")
-        references, values = x.references.tolist(), x.raw.tolist()
-        self.driver.attempt("set its discrete inputs", lambda: setter(references, values))
+        self.driver.attempt("set its discrete inputs", setter, x.references.tolist(), x.raw.tolist())
 
     def _discrete_states(self, t: float, ticking: Iterable[int] = ()) -> bool:
-        """Update the discrete states until they stay; return whether the FMU asks to end the run."""
+        """Update the discrete states until they no longer change; return whether the FMU ends the run."""
         active = set(ticking)
 
         def exchange() -> None:
@@ -148,10 +129,10 @@ class EventInstance(FMUInstance):
     # -------------------------------------------------------------------------- clocks
 
     def _exchange_clocked(self, t: float, active: set[int]) -> None:
-        """Ask which output clocks tick; set and get the variables of the clocks that are active."""
+        """Read the output clocks; set and get the variables of the clocks that are active."""
         references = self._output_clocks
         if references:
-            ticks = self.driver.attempt("read its clocks", lambda: self.api.getClock(references))
+            ticks = self.driver.attempt("read its clocks", self.api.getClock, references)
             ticked = [ref for ref, ticks_now in zip(references, ticks, strict=True) if ticks_now]
             active.update(ticked)
             for x in self.outputs:

@@ -17,43 +17,24 @@ class Driver2(Driver):
 
     VERSION = FMI2
 
-    def _class(self) -> Any:
-        from fmpy.fmi2 import FMU2Model, FMU2Slave
-
-        return FMU2Model if self.model_exchange else FMU2Slave
-
     def _instantiate(self) -> None:
         self.api.instantiate(callbacks=callbacks(self), loggingOn=True)
 
     def configure(self, values: Mapping[str, Sequence[Any]]) -> None:
         """Do nothing: FMI 2.0 has no structural parameters."""
 
-    def initialize(
-        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
-    ) -> None:
-        """Set up the experiment, set start values, initialize."""
+    def _enter_initialization(self, t0: float, set_start: Callable[[], None]) -> None:
         self.attempt("set up the experiment", lambda: self.api.setupExperiment(startTime=t0))
         set_start()
         self.attempt("enter initialization", self.api.enterInitializationMode)
-        settle()
-        self.attempt("exit initialization", self.api.exitInitializationMode)
-
-    def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:
-        """Update the discrete states once."""
-        return self.api.newDiscreteStates()  # type: ignore[no-any-return]
-
-    def counts(self) -> tuple[int, int]:
-        """Return the numbers of the model description."""
-        description = self.file.description
-        return int(description.numberOfContinuousStates), int(description.numberOfEventIndicators or 0)
 
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
-        values = self.attempt("get its values", lambda: getattr(self.api, f"get{access}")(references))
+        values = self.attempt("get its values", getattr(self.api, f"get{access}"), references)
         return [(v or b"").decode(errors="replace") for v in values] if access == "String" else list(values)
 
     def asks_to_end(self) -> float | None:
-        """Ask an FMU that discarded a step whether it did so to end the run."""
+        """Return the last successful time if the FMU discarded a step to end the run, else None."""
         try:
             terminated = self.api.getBooleanStatus(_TERMINATED)
             last = self.api.getRealStatus(_LAST_SUCCESSFUL_TIME)

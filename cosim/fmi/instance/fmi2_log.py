@@ -1,9 +1,8 @@
-"""The logger of FMI 2.0 FMUs: one for the process, because FMPy's native proxy knows only one.
+"""The logger of FMI 2.0 FMUs: one per process, because FMPy's native proxy has room for one only.
 
-The proxy formats the lines of an FMU's log, as printf does, and passes them to the logger that was
-added last, whichever FMU they come from. So the logger that is added here stays, and finds the
-instance by the environment that the FMU passes back. Lines of FMUs that FMPy itself runs are
-printed, as FMPy does.
+The proxy formats the lines of an FMU's log as printf does, and passes those of all FMUs to the
+logger that was added last. So this logger stays, and finds the instance by the environment that
+the FMU passes back. Lines of FMUs that FMPy itself runs are printed, as FMPy prints them.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ _numbers = count(1)
 
 
 def callbacks(instance: Noting | None = None) -> Any:
-    """Return the callbacks for a new instance of an FMU, its logger among them.
+    """Return the callbacks for a new instance of an FMU, including its logger.
 
-    Without an instance, this puts the process' logger back in use after FMPy has added another.
+    Without an instance, this puts the logger of the process back in use after FMPy has added another.
     """
     from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions
     from fmpy.logging import addLoggerProxy

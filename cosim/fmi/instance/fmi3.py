@@ -1,7 +1,7 @@
 """The driver of FMI 3.0. Booleans are bytes, enumerations Int64.
 
-A Co-Simulation FMU may return early from a step, and may offer an event mode. Structural
-parameters that are given are set in configuration mode, before initialization.
+A Co-Simulation FMU may return early from a step and may have an event mode. Structural parameters
+are set in configuration mode, before initialization.
 """
 
 from __future__ import annotations
@@ -18,18 +18,14 @@ class Driver3(Driver):
 
     VERSION = FMI3
 
-    def _class(self) -> Any:
-        from fmpy.fmi3 import FMU3Model, FMU3Slave
-
-        return FMU3Model if self.model_exchange else FMU3Slave
-
     def _instantiate(self) -> None:
         def log(_: Any, status: int, category: bytes, message: bytes) -> None:
             self.note(status, message)
 
         self.answer = StepAnswer()
         self.event_time = self.answer.event_time
-        self.configured = False  # if it is, arrays and so states may differ in size from the description
+        #: whether structural parameters were set, which may change the numbers of states and indicators
+        self.configured = False
         if self.model_exchange:
             self.api.instantiate(loggingOn=True, logMessage=log)
             return
@@ -46,32 +42,23 @@ class Driver3(Driver):
             return
         self.configured = True
         component = self.api.component
-        self.attempt("enter configuration mode", lambda: self.api.fmi3EnterConfigurationMode(component))
+        self.attempt("enter configuration mode", self.api.fmi3EnterConfigurationMode, component)
         for name, value in values.items():
             self.set(self.file.variables[name], value)
-        self.attempt("exit configuration mode", lambda: self.api.fmi3ExitConfigurationMode(component))
+        self.attempt("exit configuration mode", self.api.fmi3ExitConfigurationMode, component)
 
-    def initialize(
-        self, t0: float, set_start: Callable[[], None], settle: Callable[[], None] = lambda: None
-    ) -> None:
-        """Set start values, initialize from t0."""
+    def _enter_initialization(self, t0: float, set_start: Callable[[], None]) -> None:
         set_start()
         self.attempt("enter initialization", lambda: self.api.enterInitializationMode(startTime=t0))
-        settle()
-        self.attempt("exit initialization", self.api.exitInitializationMode)
-
-    def discrete_states(self) -> tuple[bool, bool, bool, bool, bool, float]:
-        """Update the discrete states once."""
-        return self.api.updateDiscreteStates()  # type: ignore[no-any-return]
 
     def counts(self) -> tuple[int, int]:
         """Return the numbers of the model description, or those of the instance if it was configured."""
         if not self.configured:
-            description = self.file.description
-            return int(description.numberOfContinuousStates), int(description.numberOfEventIndicators)
+            return super().counts()
         states = self.attempt("count its states", self.api.getNumberOfContinuousStates)
         return int(states), int(self.attempt("count its events", self.api.getNumberOfEventIndicators))
 
     def get(self, access: str, references: Sequence[int], count: int) -> list[Any]:
         """Get values."""
-        return self.attempt("get its values", lambda: getattr(self.api, f"get{access}")(references, count))  # type: ignore[no-any-return]
+        getter = getattr(self.api, f"get{access}")
+        return self.attempt("get its values", getter, references, count)  # type: ignore[no-any-return]

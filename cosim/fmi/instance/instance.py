@@ -1,15 +1,14 @@
 """A running FMU: its buffers, and the operations that call its functions by address.
 
-The part that all instances share; co_simulation.py and model_exchange.py add how they advance.
+All instances share this part; co_simulation.py and model_exchange.py add the operations that advance.
 """
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +16,9 @@ from ...errors import CosimError, FMUError, SnapshotError
 from ...loop.conversions import FromFloat, ToFloat
 from ...loop.numbers import Number
 from ...loop.operations import Call, Operation
-from ...loop.signals import RunSignals, ctrl_c
-from ..fmu_file import FMUFile
+from ...loop.signals import ctrl_c
 from ..ports import FMUPort
-from .driver import ERROR, OK
-from .drivers import load
+from .driver import ERROR, OK, Driver
 
 
 class VariableGroup:
@@ -31,9 +28,9 @@ class VariableGroup:
         self, access: str, number: Number, discrete: bool, clocks: frozenset[int], ports: list[FMUPort]
     ) -> None:
         self.access = access
-        #: whether they can change at events only, where there are events
+        #: whether they are set in events, where the FMU has an event mode
         self.discrete = discrete
-        #: references of the clocks at whose ticks alone they can be got and set
+        #: references of their clocks, at whose ticks alone they can be got and set
         self.clocks = clocks
         self.is_clock = access == "Clock"
         self.number = number
@@ -52,23 +49,12 @@ class VariableGroup:
 
 
 class FMUInstance:
-    """One instance of an FMU in a run."""
+    """One instance of an FMU in a run, with buffers for the ports in `used`."""
 
-    is_compiled = True
-    model_exchange: ClassVar[bool] = False
-
-    def __init__(
-        self,
-        name: str,
-        fmu: FMUFile,
-        signals: RunSignals,
-        used: set[str],
-        event_mode: bool = False,
-        isolated: bool = False,
-    ) -> None:
-        self.name = name
-        self.fmu = fmu
-        self.signals = signals
+    def __init__(self, driver: Driver, used: Set[str]) -> None:
+        self.driver, self.api = driver, driver.api
+        self.name, self.signals = driver.name, driver.signals
+        self.fmu = fmu = driver.file
         #: whether it is initialized and not yet terminated
         self.running = False
         #: states of the FMU that were got and not freed
@@ -79,8 +65,6 @@ class FMUInstance:
         self.start_values = {n: v for n, v in given.items() if n not in structural | fmu.clocks.keys()}
         #: the intervals of clocks that were given
         self.intervals = {n: v for n, v in given.items() if n in fmu.clocks}
-        self.driver = load(fmu, name, self.model_exchange, signals, event_mode, isolated)
-        self.api = self.driver.api
         try:
             self.driver.configure({n: given[n] for n in structural})
         except CosimError:
@@ -88,13 +72,13 @@ class FMUInstance:
             raise
         self.inputs = self._groups({n: p for n, p in fmu.input_ports.items() if n in used})
         for x in self.inputs:
-            if x.clocks:  # the values until the clock ticks; they can be got at its ticks only
+            if x.clocks:  # the values until the first tick, at which alone they can be got
                 x.values[:] = [s for n in x.addresses for s in fmu.input_ports[n].start_values(given)]
         self.outputs = self._groups({n: p for n, p in fmu.output_ports.items() if n in used})
-        #: last strings and binary data that were got, by output (None before), and sent, by input
+        #: last strings and binary data: got, by output (None before the first), and sent, by input
         self.texts: dict[str, Any] = {n: None for n in fmu.text_outputs if n in used}
         self.sent_texts: dict[str, Any] = {}
-        #: the instance and output from which an input of that kind comes
+        #: the source of each such input: an instance and its output
         self.text_sources: dict[str, tuple[Any, str]] = {}
 
     def _groups(self, ports: dict[str, FMUPort]) -> list[VariableGroup]:
@@ -121,19 +105,19 @@ class FMUInstance:
                 for element, value, held in zip(x.elements, now, x.values.tolist(), strict=True):
                     if value != held and not x.number.is_float:  # NaN differs from itself
                         raise FMUError(
-                            f"{self.name}.{element} starts with {value}, which is above 2^53, and a float "
-                            "does not hold it; do not connect or record it"
+                            f"{self.name}.{element} starts with {value}, which is above 2^53 and does not "
+                            "fit a float; do not connect or record it"
                         )
 
     def _settle(self, t0: float) -> None:
-        """Make the calls that belong into initialization mode."""
+        """Make the calls that belong in initialization mode."""
 
     def _set_start(self) -> None:
         for name, values in self.start_values.items():
             self.driver.set(self.fmu.variables[name], values)
 
     def stop(self) -> str:
-        """Terminate and free the instance; return how it crashed meanwhile if it is isolated and did."""
+        """Terminate and free the instance; return how an isolated FMU crashed meanwhile, or ""."""
         before = self.driver.crash()
         with ctrl_c(self.signals):
             self._end()
@@ -169,7 +153,7 @@ class FMUInstance:
 
     @property
     def can_serialise(self) -> bool:
-        """Whether the FMU can give its state as bytes."""
+        """Whether the FMU can serialise its state to bytes."""
         return bool(self.can_save and self.driver.interface.canSerializeFMUstate)
 
     @property
@@ -187,15 +171,14 @@ class FMUInstance:
     def kind(self) -> tuple[Any, ...]:
         """Return the properties that another instance must share to restore a state of this one."""
         ports = tuple(tuple(x.elements) for x in [*self.inputs, *self.outputs])
-        return self.fmu.description.guid, self.model_exchange, self.driver.event_mode, ports
+        return self.fmu.description.guid, self.driver.model_exchange, self.driver.event_mode, ports
 
     def save(self, serialised: bool = True) -> tuple[Any, ...]:
-        """Return buffers and texts, and the state of the FMU: as bytes if it can, else kept until `stop`."""
+        """Return buffers, texts and the FMU's state: as bytes if possible, else kept until `stop`."""
         state = self.driver.attempt("get its state", self.api.getFMUState)
         if serialised and self.can_serialise:
-            serialise = self.api.serializeFMUState
-            kept = self.driver.attempt("serialise its state", lambda: serialise(state))
-            self.driver.attempt("free its state", lambda: self.api.freeFMUState(state))
+            kept = self.driver.attempt("serialise its state", self.api.serializeFMUState, state)
+            self.driver.attempt("free its state", self.api.freeFMUState, state)
         else:
             kept = state
             self.kept.append(state)
@@ -211,11 +194,10 @@ class FMUInstance:
         self.driver.status = OK
         state = kept
         if isinstance(kept, bytes):
-            deserialise = self.api.deserializeFMUState
-            state = self.driver.attempt("read its state", lambda: deserialise(kept))
-        self.driver.attempt("set its state", lambda: self.api.setFMUState(state))
+            state = self.driver.attempt("read its state", self.api.deserializeFMUState, kept)
+        self.driver.attempt("set its state", self.api.setFMUState, state)
         if isinstance(kept, bytes):
-            self.driver.attempt("free its state", lambda: self.api.freeFMUState(state))
+            self.driver.attempt("free its state", self.api.freeFMUState, state)
         for array, values in zip(self.arrays(), arrays, strict=True):
             array[:] = values
         self.texts, self.sent_texts = (dict(each) for each in texts)
@@ -223,16 +205,13 @@ class FMUInstance:
     def forget(self, saved: Any) -> None:
         """Free a state that was kept."""
         self.kept.remove(saved[1])
-        self.driver.attempt("free its state", lambda: self.api.freeFMUState(saved[1]))
+        self.driver.attempt("free its state", self.api.freeFMUState, saved[1])
 
     def arrays(self) -> list[Any]:
         """Return the memory that belongs to the state of this instance."""
         return [array for x in [*self.inputs, *self.outputs] for array in (x.values, x.raw, x.last)]
 
     # ---------------------------------------------------------------------- operations
-
-    def _function(self, name: str) -> int:
-        return ctypes.cast(self.driver.function(name), ctypes.c_void_p).value or 0
 
     @property
     def _component(self) -> int:
@@ -254,7 +233,7 @@ class FMUInstance:
 
     def _values(self, what: str, x: VariableGroup, finite: bool = False) -> Operation:
         return self.fmu.version.values(
-            function=self._function(f"{self.fmu.version.prefix}{what}{x.access}"),
+            function=self.driver.address(f"{what}{x.access}"),
             component=self._component,
             references=int(x.references.ctypes.data),
             values=int(x.raw.ctypes.data),
@@ -274,11 +253,6 @@ class FMUInstance:
             number=x.number,
             participant=self.name,
         )
-
-    def latch(self) -> list[Operation]:
-        """Set the inputs."""
-        numbers = [op for x in self.inputs for op in self._set_inputs(x)]
-        return [*numbers, *self._latch_texts()]
 
     def _set_inputs(self, x: VariableGroup) -> list[Operation]:
         return [*self._from_floats(x), self._values("Set", x)]
@@ -303,19 +277,19 @@ class FMUInstance:
 
     def _get_texts(self, t: float, h: float) -> None:
         for name in self.texts:
-            v = self.fmu.text_outputs[name]
+            v = self.fmu.variables[name]
             empty: Any = "" if v.type == "String" else b""
             self.texts[name] = self.driver.get(v.type, [v.valueReference], 1)[0] or empty
 
     def _new_texts(self) -> dict[str, Any]:
-        """Return the texts of inputs that differ from the last ones sent."""
+        """Return the texts, by input, that differ from the last ones sent."""
         coming = {name: source.texts[port] for name, (source, port) in self.text_sources.items()}
         sent = self.sent_texts
         return {name: text for name, text in coming.items() if text not in (None, sent.get(name))}
 
     def _set_texts(self, texts: Mapping[str, Any]) -> None:
         for name, text in texts.items():
-            self.driver.set(self.fmu.text_inputs[name], [text])
+            self.driver.set(self.fmu.variables[name], [text])
         self.sent_texts.update(texts)
 
     # ----------------------------------------------------------------------- questions

@@ -1,17 +1,18 @@
-"""A running FMU with Model Exchange: it is integrated and its events are handled here.
+"""A running FMU with Model Exchange: its integration and its events.
 
 Under sampled coupling it is integrated over each communication step with its inputs held:
 by CVODE, from event to event (event_steps.py), or by a fixed-step method in equal
 substeps. The latter runs in the compiled loop; a step that contains a time event is
 split there, and a state event is handled at the end of the step. Under stage coupling the
-solver of the run integrates it, with one step for all participants; events are handled at its end.
+solver of the run integrates it, in one step for all components; events are handled at its end.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from typing import Any, ClassVar
+from collections.abc import Set
+from typing import Any
 
 import numpy as np
 
@@ -20,41 +21,30 @@ from ...errors import CosimError, LateEventWarning
 from ...loop.fmi_operations import CompletedStep, End, Repeat, SetTime, UnlessEvent, Vector
 from ...loop.instance import buffer
 from ...loop.operations import SLACK, Call, Combine, Copy, Operation
-from ...loop.signals import RunSignals
-from ..fmu_file import FMUFile
 from ..interfaces import DEFAULT_TOLERANCE, ModelExchange
 from .continuous_time import ContinuousTime
+from .driver import Driver
 from .event_steps import EventSteps, RungeKutta
 from .events import EventInstance
 
 
 class ModelExchangeInstance(EventInstance):
-    """One instance of an FMU in a run, with Model Exchange; its options have a solver."""
+    """One instance of an FMU in a run, with Model Exchange; `options` name a solver."""
 
-    model_exchange: ClassVar[bool] = True
-
-    def __init__(
-        self,
-        name: str,
-        fmu: FMUFile,
-        signals: RunSignals,
-        used: set[str],
-        options: ModelExchange,
-        isolated: bool,
-    ) -> None:
-        super().__init__(name, fmu, signals, used, isolated=isolated)
+    def __init__(self, driver: Driver, used: Set[str], options: ModelExchange) -> None:
+        super().__init__(driver, used)
         try:
-            self.n_states, self.n_indicators = self.driver.counts()
+            self.n_states, self.n_indicators = driver.counts()
         except CosimError:
             self.stop()
             raise
         self.states = buffer(self.n_states)
         self.state_address = int(self.states.ctypes.data)
-        self.flags = np.zeros(2, dtype=fmu.version.flag)
+        self.flags = np.zeros(2, dtype=driver.VERSION.flag)
         self.signs = buffer(self.n_indicators) > 0.0
         self.stages = buffer(5 * self.n_states)
         self.event_address = 0
-        self.model = ContinuousTime(self.driver, self.n_states, self.n_indicators)
+        self.model = ContinuousTime(driver, self.n_states, self.n_indicators)
         self.options = options
         #: the solver of sampled coupling
         self.solver = str(options.solver)
@@ -112,7 +102,7 @@ class ModelExchangeInstance(EventInstance):
 
     def _vector(self, name: str, address: int) -> Operation:
         return Vector(
-            function=self._function(name),
+            function=self.driver.address(name),
             component=self._component,
             values=address,
             count=self.n_states,
@@ -121,16 +111,16 @@ class ModelExchangeInstance(EventInstance):
 
     def set_states(self, fraction: float, substeps: int = 1) -> list[Operation]:
         """Set time and states."""
-        prefix = self.fmu.version.prefix
         time = SetTime(
-            function=self._function(f"{prefix}SetTime"),
+            function=self.driver.address("SetTime"),
             component=self._component,
             fraction=fraction,
             substeps=substeps,
             participant=self.name,
         )
-        states = f"{prefix}SetContinuousStates"
-        return [time, self._vector(states, self.state_address)] if self.n_states else [time]
+        if not self.n_states:
+            return [time]
+        return [time, self._vector("SetContinuousStates", self.state_address)]
 
     def derivatives(self, target: int, fraction: float) -> list[Operation]:
         """Get the derivatives into `target`."""
@@ -141,7 +131,7 @@ class ModelExchangeInstance(EventInstance):
         self.event_address = self.event_address or self.signals.callback(self.name, self._handle_events)
         # always, even if the model states that it need not be told: FMPy reads that flag inverted
         completed = CompletedStep(
-            function=self._function(f"{self.fmu.version.prefix}CompletedIntegratorStep"),
+            function=self.driver.address("CompletedIntegratorStep"),
             component=self._component,
             flags=int(self.flags.ctypes.data),
             event_time=int(self.event_time.ctypes.data),
@@ -207,7 +197,7 @@ class ModelExchangeInstance(EventInstance):
         elif due < t - SLACK * h:
             self._warn_late(
                 f"a time event at t = {due:g} s, inside the step to t = {t:g} s, which is handled at its "
-                "end: stage coupling has one step for all participants; choose a step that meets the event, "
+                "end: stage coupling has one step for all components; choose a step that meets the event, "
                 "or sampled coupling"
             )
         changed = bool((signs != self.signs).any())

@@ -1,8 +1,8 @@
 """The input clocks of an instance that tick at an interval.
 
 Such a clock ticks at t_start + shift + i interval, i = 0, 1, ...; interval and shift must be whole
-numbers of communication steps. The interval comes from the model description. That of a clock
-with fixed or tunable interval may be given as its start value; otherwise the FMU is asked.
+numbers of communication steps. A fixed or tunable interval may be given as the start value of the
+clock; otherwise it comes from the model description or, where that states none, from the FMU.
 """
 
 from __future__ import annotations
@@ -28,11 +28,8 @@ class Timers:
         #: reference, and interval and shift in steps, of each clock
         self._timers: list[tuple[int, int, int]] = []
 
-    def __bool__(self) -> bool:
-        return bool(self._clocks)
-
     def start(self, t0: float, given: Mapping[str, list[Any]]) -> None:
-        """Settle the intervals, in initialization mode."""
+        """Determine the intervals, in initialization mode."""
         self._start = t0
         self._timers = []
         for clock in self._clocks:
@@ -53,14 +50,14 @@ class Timers:
         if given is not None:
             interval[0] = given[0]
             what = f"set the interval of its clock {clock.name} to {given[0]:g} s"
-            self._driver.attempt(what, lambda: api.setIntervalDecimal(references, interval))
+            self._driver.attempt(what, api.setIntervalDecimal, references, interval)
             return float(given[0]), clock.shift
         if clock.interval is not None:
             return clock.interval, clock.shift
         shift, qualifier = (ctypes.c_double * 1)(), (ctypes.c_int * 1)()
         what = f"tell the interval of its clock {clock.name}"
-        self._driver.attempt(what, lambda: api.getIntervalDecimal(references, interval, qualifier))
-        self._driver.attempt(what, lambda: api.getShiftDecimal(references, shift))
+        self._driver.attempt(what, api.getIntervalDecimal, references, interval, qualifier)
+        self._driver.attempt(what, api.getShiftDecimal, references, shift)
         if not (qualifier[0] and interval[0] > 0.0):
             raise FMUError(
                 f"{self._driver.name}: its clock {clock.name} has an interval neither in the model "

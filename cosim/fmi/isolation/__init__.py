@@ -1,1 +1,1 @@
-"""An FMU in a process of its own."""
+"""Isolation: an FMU in a process of its own."""

@@ -1,14 +1,14 @@
-"""The functions of FMI that an isolated FMU can be asked for, as one table, and the C code made from it.
+"""The functions of FMI that an isolated FMU supports, as a table, and the C code generated from it.
 
-A row is the function's prototype without the instance, in which an array states its direction and
-length: `in double x[n]`, `out text values[n]`. From it come both ends of a call: the function of
-FMI that this process calls, which packs its arguments (caller.h), and the call that the host makes
-(host.c). The compiler compares both with the FMI headers. Making and freeing an instance is not
-in the table: instances.c and host.c do it by hand.
+A row is the function's prototype without the instance; an array states its direction and
+length: `in double x[n]`, `out text values[n]`. Both ends of a call are generated from it: the
+function of FMI that this process calls, which packs its arguments (caller.h), and the call that the
+host makes (host.c). The compiler compares both with the FMI headers. The functions that make and
+free an instance are not in the table but written by hand in instances.c and host.c.
 
-The word before a name tells how the loop of a run calls the function, which then exists twice, with
-`loop_` before the name of the second: see caller.h. An argument `t` is a time and `h` the length of
-a step, which are kept for the message of a crash.
+The word before a name is the way in which the loop of a run calls the function. Unless it is
+"call", the function exists twice, the second time with `loop_` before its name: see caller.h.
+The arguments `t`, a time, and `h`, the length of a step, are kept for the message of a crash.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ _ELEMENTS = {"text": "char *", "blob": "uint8_t *"}  # of strings and binary dat
 
 @dataclass(frozen=True)
 class _Argument:
-    """One argument: its direction, "" of a plain value, its type, name and the length of an array."""
+    """An argument: direction ("" for a plain value), type, name, and length of an array."""
 
     direction: str
     type: str
@@ -165,7 +165,7 @@ class _Function:
     arguments: tuple[_Argument, ...]
 
     def caller(self) -> str:
-        """Return the functions of FMI that this process calls."""
+        """Return the definitions of the function that this process calls."""
         parameters = "".join(f", {a.parameter()}" for a in self.arguments)
         packed = ", ".join(a.packed() for a in self.arguments)
         names = [a.name for a in self.arguments]
@@ -179,7 +179,7 @@ class _Function:
         )
 
     def host(self) -> str:
-        """Return the case of the host that calls the FMU."""
+        """Return the case of the host's switch that calls the FMU."""
         words = "".join(f", {a.unpacked(i)}" for i, a in enumerate(self.arguments))
         return f"    case F_{self.name}: return (int)(({self.name}TYPE *)f)(instance{words});\n"
 
@@ -193,7 +193,7 @@ def _parsed(row: str) -> _Function:
 
 
 def sources() -> dict[str, str]:
-    """Return the generated files by name: the functions' numbers, and their two ends."""
+    """Return the generated files by name: the numbers of the functions, and both ends of their calls."""
     functions = [_parsed(row) for row in _TABLE.splitlines() if row]
     names = [*_HANDMADE.split(), *(f.name for f in functions)]
     return {

@@ -1,9 +1,10 @@
-"""The process of an isolated FMU, which loads its library and makes the calls from shared memory.
+"""The host of an isolated FMU: the process that loads its library and makes the calls.
 
     python isolated_host.py MEMORY SIZE SUPPORT LIBRARY
 
-It needs the standard library only, so that it starts within hundredths of a second, and is run
-as a file because the package would load NumPy. isolation.py starts and ends it.
+The calls come through shared memory. The host uses the standard library alone, so that it starts
+within hundredths of a second; it is run as a file because the package would load NumPy.
+isolation.py starts and ends it.
 """
 
 import ctypes
@@ -17,7 +18,7 @@ from pathlib import Path
 
 
 def end_with_parent() -> None:
-    """End when the other end of standard input is closed, because then the parent has ended."""
+    """End this process when the other end of standard input closes, because the parent has ended."""
     lifeline = os.dup(0)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)  # the standard input of the FMU

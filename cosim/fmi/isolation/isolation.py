@@ -1,4 +1,4 @@
-"""An FMU in a process of its own: a crash there becomes an error here.
+"""The process of an isolated FMU, seen from this process: a crash there becomes an error here.
 
     FMUInstance --addresses--> functions of FMI (functions.py, c/caller.c)   this process
                                   | shared memory (c/channel.h)
@@ -6,7 +6,8 @@
 
 The functions have the names and signatures of FMI, so that FMPy and the loop call them as
 they call those of an FMU. A process serves one instance. It ends with its instance, or when this
-process ends. The memory has no name, so that it is freed with the two processes.
+process ends. The memory has no name, so that it is freed with the two processes. No wait has a
+time limit, not even that for the start: it ends with an answer, with the process, or with Ctrl-C.
 """
 
 from __future__ import annotations
@@ -43,18 +44,20 @@ from .functions import sources as generated_sources
 _SOURCES = Path(__file__).parent / "c"
 _HOST = Path(__file__).parent / "isolated_host.py"
 _SIZE = 1 << 28  # bytes of shared memory; pages that are never touched cost nothing
-_FAREWELL = 2.0  # s that the FMU's library has to finish its work
+_FAREWELL = 2.0  # s until the process is killed, in which the FMU's library may finish its work
 _LOOK = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
 _EXCEPTIONS = {0xC0000005: "access violation", 0xC00000FD: "stack overflow"}  # of Windows
 
 
 @lru_cache(maxsize=1)
 def support_library() -> Path:
-    """Return the library with both sides of the channel, compiled if it is not in the cache."""
+    """Return the path of the library with both ends of the channel; compile it if it is not cached.
+
+    Raises CompilationError if it cannot be compiled, and on an unsupported platform.
+    """
     if host() not in PLATFORMS:
         raise CompilationError(
-            f"an FMU cannot be isolated on {host()}; leave isolated=True away, or use one of "
-            f"{', '.join(PLATFORMS)}"
+            f"an FMU cannot be isolated on {host()}; omit isolated=True, or use one of {', '.join(PLATFORMS)}"
         )
     platform = PLATFORMS[host()]
     files = sorted([*_SOURCES.glob("*.[ch]"), *fmi_headers().glob("fmi[23]*.h")])
@@ -73,7 +76,7 @@ def support_library() -> Path:
 
 
 def compile_support(folder: Path, *flags: str) -> tuple[subprocess.CompletedProcess[str], Path]:
-    """Compile the library in a folder; return what the compiler reports, and the library's path."""
+    """Compile the library in a folder; return the finished compiler process and the library's path."""
     platform = PLATFORMS[host()]
     for name, text in generated_sources().items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -100,7 +103,7 @@ def _support() -> Any:
 
 
 class Isolation:
-    """The process of one instance of an FMU, which has loaded the FMU's library.
+    """The process of one instance of an FMU, with the FMU's library loaded.
 
     The next instance that FMPy makes in this thread through `support_library()` runs in it.
     Raises FMUError if the library cannot be loaded.
@@ -111,7 +114,7 @@ class Isolation:
         self.signals = signals
         #: how the process ended unexpectedly, or ""
         self.crash = ""
-        #: whether no call is possible any more: the process ended, or Ctrl-C came during a call
+        #: whether calls are no longer possible: the process ended, or Ctrl-C came during a call
         self.is_gone = False
         self._support = _support()
         self._memory, handle, inherited = _shared_memory()
@@ -121,7 +124,7 @@ class Isolation:
         finally:
             for file in inherited:
                 os.close(file)
-        self._end = weakref.finalize(self, _end, self._process)  # for an instance that is never stopped
+        self._end = weakref.finalize(self, _end, self._process)  # also for an instance that is not closed
         self._look = _LOOK(self._interrupted_or_ended)
         address = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
         self._caller = self._support.caller_open(address, _SIZE, self._look)
@@ -141,9 +144,9 @@ class Isolation:
                 self.crash = self._ending(code)
                 self.is_gone = True
             return int(self.is_gone)
-        except BaseException as exception:  # Ctrl-C, which C code cannot raise
+        except BaseException as exception:  # Ctrl-C, which cannot pass through C code
             self.is_gone = True
-            self.signals.exception, self.signals.participant, self.signals.time = exception, self.name, t
+            self.signals.note(exception, self.name, t)
             return 1
 
     def _ending(self, code: int) -> str:
@@ -165,7 +168,7 @@ class Isolation:
             raise self.signals.exception
 
     def close(self) -> None:
-        """End the process; no function of the instance may be called after that."""
+        """End the process; its functions must not be called afterwards."""
         if self._support.caller_stop(self._caller):
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(_FAREWELL)
@@ -182,7 +185,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _shared_memory() -> tuple[mmap.mmap, str, list[int]]:
-    """Return the memory, the handle by which the host finds it, and the files that the host inherits."""
+    """Return the memory, its handle for the host, and the files that the host inherits."""
     if sys.platform == "win32":
         tag = f"structcosim-{uuid.uuid4()}"
         return mmap.mmap(-1, _SIZE, tagname=tag), tag, []

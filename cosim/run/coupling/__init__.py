@@ -1,1 +1,1 @@
-"""One file a coupling: each puts the operations of the instances of a system in order."""
+"""The couplings, one file each: they put the operations of the instances of a system in order."""

@@ -1,12 +1,12 @@
 """Iterated coupling: FMUs and Continuous participants that drive each other, without delay.
 
-Under sampled coupling each of two coupled plants holds the other one's value at t_k, an
-error of first order in h that can destabilise. Here the values w that they exchange are
-solved for at t_{k+1}: each step is taken with their mean held,
+Under sampled coupling each of two coupled plants holds the other one's value at t_k, which
+is an error of first order in h and can make the loop unstable. Here the exchanged values w
+are solved for at t_{k+1}: each step is taken with their mean held,
 
     hold (w_k + w_{k+1}) / 2 over [t_k, t_{k+1}],  w_{k+1} = outputs at t_{k+1} with w_{k+1} as inputs,
 
-undone and repeated until w_{k+1} agrees with itself (quasi_newton.py). So the interface
+and is undone and repeated until w_{k+1} agrees with itself (quasi_newton.py). So the interface
 conditions hold at every communication point, direct feedthrough in a ring included, and
 the coupling is of second order. The outputs of blocks are held over the step, as under
 sampled coupling, whose schedule at t_k is used.
@@ -18,8 +18,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...arrays import Array
 from ...core.port import Port
-from ...core.variables import Array
 from ...errors import WiringError
 from ...loop.instance import buffer
 from ...loop.loop import Loop
@@ -58,12 +58,12 @@ def iterated(binding: Binding) -> Schedule:
 
 
 class Iteration:
-    """Moves the participants that drive each other, and solves for the values that they exchange."""
+    """The components that drive each other, and the solver for the values that they exchange."""
 
     def __init__(self, binding: Binding, coupled: list[Connection]) -> None:
         self._binding = binding
         ends = {end.participant for c in coupled for end in (c.source, c.target)}
-        #: the participants, in the order of the system
+        #: the components, in the order of the system
         self.members = {name: i for name, i in binding.instances.items() if name in ends}
         reasons = {name: i.unrepeatable for name, i in self.members.items() if i.unrepeatable}
         for reason in reasons.values():
@@ -71,13 +71,13 @@ class Iteration:
             raise WiringError(f'{names} cannot be iterated: {reason}; use coupling="sampled"')
         self._sources = list(dict.fromkeys(c.source for c in coupled))
         n = sum(port.count for port in self._sources)
-        #: the values that are given to the inputs, and those that come back
+        #: the values that are written to the inputs, and those that the outputs return
         self._held, self._outputs = buffer(n), buffer(n)
         held, outputs = int(self._held.ctypes.data), int(self._outputs.ctypes.data)
         places: dict[Port, int] = {}
         for port in self._sources:
             places[port] = sum(8 * p.count for p in places)
-        #: the operations that give the one and collect the other
+        #: the operations that write the inputs and collect the outputs
         self._give = [binding.copy_from(c, held + places[c.source]) for c in coupled]
         self._collect = [
             Copy(source=binding.address(p), target=outputs + place, count=p.count)
@@ -91,7 +91,7 @@ class Iteration:
         self._callback = binding.signals.callback(next(iter(self.members)), self._step)
 
     def operation(self) -> Operation:
-        """Return the operation that moves the members from t_k to t_{k+1}."""
+        """Return the operation that takes the members from t_k to t_{k+1}."""
         text = (
             f"{', '.join(self.members)}: step, repeated until {', '.join(map(str, self._sources))} "
             f"agree at t_k+1 to {self._solver.tolerance:g} (Python callback)"
@@ -121,13 +121,13 @@ class Iteration:
                 solver, g, self._outputs.copy(), self._binding.plan.start
             )
         except EndOfRun as end:
-            raise SimulationError(f"{end.text}, which is its start") from None
+            raise SimulationError(f"{end.text}, at the start of the run") from None
 
     def _loop(self, ops: list[Operation]) -> Loop:
         return Loop(ops, [], [], self._binding.signals.stop)
 
     def _exchange(self, loop: Loop, k: int, w: Array) -> Array:
-        """Give values to the inputs, run a loop, and return the values that come back."""
+        """Write values to the inputs, run a loop, and return the values of the outputs."""
         self._held[:] = w
         self._binding.run_once(loop, k)
         return self._outputs.copy()

@@ -3,8 +3,8 @@
     r(w) = g(w) - w,   J dw = -r,   J <- J + (r_new) dw^T / (dw^T dw)
 
 g is a communication step that is repeated with other coupling values, so evaluations are
-expensive and n is small: J is built by differences once, and again only where the kept one
-no longer leads to convergence.
+expensive and n is small: J is built by differences once, and rebuilt only when it no longer
+leads to convergence.
 
 C. G. Broyden, A class of methods for solving nonlinear simultaneous equations,
 Math. Comp. 19 (1965) 577-593, doi:10.1090/S0025-5718-1965-0198670-6.
@@ -16,11 +16,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core.variables import Array
+from ...arrays import Array
 
 _REBUILD = 6  # evaluations with a kept Jacobian before it is built again
 _LIMIT = 30  # evaluations, not counting those that build the Jacobian
-_DIFFERENCE = 1e-6  # of the scale of a value, or of 1 as long as it has none
+_DIFFERENCE = 1e-6  # of the scale of a value, or of 1 while the scale is zero
 
 
 class NoConvergence(Exception):

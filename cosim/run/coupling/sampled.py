@@ -1,11 +1,11 @@
-"""Sampled coupling: what a real controller does. Inputs are held over a communication step.
+"""Sampled coupling, as with a digital controller: inputs are held over a communication step.
 
     at t_k      outputs of FMUs and Continuous participants, the result of the inputs held over
                 [t_{k-1}, t_k]; blocks that are due, in the order of their connections; record
     to t_{k+1}  copy and latch all inputs; then advance every FMU and Continuous by h
 
 A plant in a loop is never algebraic: with acceleration feedback y_k carries u_{k-1}. All
-inputs are latched before anything advances, so the order of the participants does not
+inputs are latched before anything advances, so the order of the components does not
 matter. Where continuous participants drive each other directly, each holds the value of
 the other at t_k: an error of first order in h.
 """

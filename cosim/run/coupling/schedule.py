@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from ...core.variables import Array
+from ...arrays import Array
 from ...loop.operations import Operation
 
 

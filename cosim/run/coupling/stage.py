@@ -57,7 +57,7 @@ class _States:
 
     def __init__(self, binding: Binding, name: str, stages: int) -> None:
         instance = binding.instances[name]
-        assert isinstance(instance, Integrated)  # it refuses stage coupling otherwise
+        assert isinstance(instance, Integrated)  # any other instance has refused stage coupling
         self.name, self.instance, self.n = name, instance, instance.n_states
         self.work = buffer((1 + stages) * self.n)
 

@@ -1,4 +1,4 @@
-/* Life of an instance, values and stepping. See core.h for the contract. */
+/* Life cycle of an instance, values and stepping. See core.h for the contract. */
 
 #include "core.h"
 
@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Legality of call order: in which modes an operation may be called. */
+/* Legal order of calls: the modes in which an operation may be called. */
 #define BEFORE_INITIALIZATION (INSTANTIATED | PREPARED)
 #define RUNNING (EVENT | CONTINUOUS_TIME | STEPPING)
 #define READABLE (INITIALIZING | RUNNING | TERMINATED | BROKEN)
@@ -46,7 +46,7 @@ static const unsigned legal[OPERATIONS] = {
     [NEVER] = 0,
 };
 
-/* In which modes a variable may be written: states and parameters have exact start values,
+/* Modes in which a variable may be written: states and parameters have exact start values,
    outputs and derivatives are computed. */
 static const unsigned writable[ZONES] = {
     [INPUT] = BEFORE_INITIALIZATION | INITIALIZING | RUNNING,
@@ -131,7 +131,7 @@ status core_need(struct instance *c, const void *pointer, size_t n, const char *
 
 static void load_start(struct instance *c) {
     memcpy(c->settings, model.start, model.n_slots * sizeof(double));
-    memcpy(c->record, model.start, model.n_slots * sizeof(double));
+    memcpy(c->storage, model.start, model.n_slots * sizeof(double));
     c->mode = INSTANTIATED;
     c->t = c->start_time = 0.0;
     c->stop_time = INFINITY;
@@ -161,8 +161,8 @@ struct instance *core_new(const char *name, const char *token, enum interface in
         return NULL;
     }
     if (!offers(interface)) {
-        core_refuse(&draft, here, "%s has no %s interface", model.identifier,
-                    interface == MODEL_EXCHANGE ? "Model Exchange" : "such");
+        core_refuse(&draft, here, "%s has no interface for %s", model.identifier,
+                    interface == MODEL_EXCHANGE ? "Model Exchange" : "this kind of simulation");
         return NULL;
     }
     struct instance *c = calloc(1, sizeof *c);
@@ -170,14 +170,14 @@ struct instance *core_new(const char *name, const char *token, enum interface in
     double *memory = calloc(3 * (size_t)model.n_slots + 1, sizeof(double));
     if (!c || !own_name || !memory) {
         free(c), free(own_name), free(memory);
-        core_refuse(&draft, here, "out of memory for a record of %u doubles", (unsigned)model.n_slots);
+        core_refuse(&draft, here, "out of memory for a storage of %u doubles", (unsigned)model.n_slots);
         return NULL;
     }
     *c = draft;
     c->name = strcpy(own_name, name);
     c->interface = interface;
     c->log_errors = c->log_events = logging;
-    c->record = memory;
+    c->storage = memory;
     c->settings = memory + model.n_slots;
     c->trial = memory + 2 * (size_t)model.n_slots;
     load_start(c);
@@ -186,7 +186,7 @@ struct instance *core_new(const char *name, const char *token, enum interface in
 
 void core_free(struct instance *c) {
     if (!c) return;
-    free(c->record);
+    free(c->storage);
     free(c->name);
     free(c);
 }
@@ -226,44 +226,44 @@ status core_reset(struct instance *c) {
 
 /* --- evaluation ----------------------------------------------------------------------------- */
 
-uint32_t core_first_not_finite(const double *record, uint32_t first, uint32_t last) {
+uint32_t core_first_not_finite(const double *storage, uint32_t first, uint32_t last) {
     uint64_t bad = 0; /* all bits of the exponent set: infinity or NaN; no branch per slot */
     PLAIN_LOOP
     for (uint32_t i = first; i < last; i++) {
         uint64_t bits;
-        memcpy(&bits, record + i, sizeof bits);
+        memcpy(&bits, storage + i, sizeof bits);
         bad |= (bits & 0x7ff0000000000000u) == 0x7ff0000000000000u;
     }
     if (!bad) return last;
-    while (first < last && isfinite(record[first])) first++;
+    while (first < last && isfinite(storage[first])) first++;
     return first;
 }
 
-int32_t core_run(double *record, double t) {
-    int32_t code = model.derivatives ? model.derivatives(record, t, 0.0) : 0;
-    if (!code && model.outputs) code = model.outputs(record, t, 0.0);
+int32_t core_run(double *storage, double t) {
+    int32_t code = model.derivatives ? model.derivatives(storage, t, 0.0) : 0;
+    if (!code && model.outputs) code = model.outputs(storage, t, 0.0);
     return code;
 }
 
 SELDOM static status not_finite(struct instance *c, uint32_t slot, const char *function) {
     char name[128];
     core_slot_name(slot, name, sizeof name);
-    return core_refuse(c, function, "%s became %g at t = %.9g", name, c->record[slot], c->t);
+    return core_refuse(c, function, "%s became %g at t = %.9g", name, c->storage[slot], c->t);
 }
 
 status core_evaluate(struct instance *c, const char *function) {
     if (!c->stale) return OK;
     if (c->mode & (BEFORE_INITIALIZATION | INITIALIZING)) {
-        memcpy(c->record, c->settings, model.n_slots * sizeof(double));
-        int32_t code = model.initialize ? model.initialize(c->record, c->t, 0.0) : 0;
-        if (code) return core_refuse(c, function, "initialize gave up (code %d)", (int)code);
+        memcpy(c->storage, c->settings, model.n_slots * sizeof(double));
+        int32_t code = model.initialize ? model.initialize(c->storage, c->t, 0.0) : 0;
+        if (code) return core_refuse(c, function, "initialize failed (code %d)", (int)code);
     }
-    int32_t code = core_run(c->record, c->t);
-    if (code) return core_refuse(c, function, "the equations gave up at t = %.9g (code %d)", c->t, (int)code);
+    int32_t code = core_run(c->storage, c->t);
+    if (code) return core_refuse(c, function, "the equations failed at t = %.9g (code %d)", c->t, (int)code);
     static const enum zone computed[] = {OUTPUT, DERIVATIVE}; /* inputs and states are checked when they are set */
     for (int i = 0; i < 2; i++) {
         uint32_t last = model.zone[computed[i] + 1];
-        uint32_t slot = core_first_not_finite(c->record, model.zone[computed[i]], last);
+        uint32_t slot = core_first_not_finite(c->storage, model.zone[computed[i]], last);
         if (slot < last) return not_finite(c, slot, function);
     }
     c->stale = false;
@@ -302,8 +302,8 @@ uint32_t core_extent(uint32_t reference, bool whole, const struct variable **var
     return whole ? v->size : 1;
 }
 
-/* The loop of a master reads and writes elements of zones that are all readable or writable: no search.
-   True when every reference lies below `end`; `*computed`: one of them is not an input. */
+/* A master's loop reads and writes elements of zones that are all readable or writable, so that no
+   search is needed. True when every reference lies below `end`; `*computed`: one of them is not an input. */
 static bool all_below(uint32_t end, const uint32_t *references, size_t n, bool *computed) {
     uint32_t largest = 0;
     PLAIN_LOOP
@@ -335,7 +335,7 @@ __attribute__((noinline)) static status get_any(struct instance *c, const uint32
     }
     if (count(c, n_values, total, function)) return FAILED;
     if (computed && core_evaluate(c, function)) return FAILED;
-    const double *source = c->mode == INITIALIZING && c->stale ? c->settings : c->record;
+    const double *source = c->mode == INITIALIZING && c->stale ? c->settings : c->storage;
     for (size_t i = 0; i < n; i++) {
         const struct variable *v;
         if (references[i] == model.n_slots) *values++ = c->t;
@@ -356,7 +356,7 @@ status core_get(struct instance *c, const uint32_t *references, size_t n, double
         return get_any(c, references, n, values, n_values, whole, function);
     if (computed && core_evaluate(c, function)) return FAILED;
     PLAIN_LOOP
-    for (size_t i = 0; i < n; i++) values[i] = c->record[references[i]];
+    for (size_t i = 0; i < n; i++) values[i] = c->storage[references[i]];
     return OK;
 }
 
@@ -393,7 +393,7 @@ __attribute__((noinline)) static status set_any(struct instance *c, const uint32
     }
     if (count(c, n_values, total, function)) return FAILED;
     bool early = c->mode & (BEFORE_INITIALIZATION | INITIALIZING);
-    double *target = early ? c->settings : c->record;
+    double *target = early ? c->settings : c->storage;
     for (size_t i = 0; i < n; i++) {
         const struct variable *v;
         uint32_t size = core_extent(references[i], whole, &v);
@@ -412,7 +412,7 @@ status core_set(struct instance *c, const uint32_t *references, size_t n, const 
         core_first_not_finite(values, 0, (uint32_t)n) < n)
         return set_any(c, references, n, values, n_values, whole, function);
     PLAIN_LOOP
-    for (size_t i = 0; i < n; i++) c->record[references[i]] = values[i];
+    for (size_t i = 0; i < n; i++) c->storage[references[i]] = values[i];
     c->stale = true;
     return OK;
 }
@@ -441,7 +441,7 @@ status core_set_states(struct instance *c, const double *x, size_t n, const char
         core_slot_name(model.zone[STATE] + (uint32_t)i, name, sizeof name);
         return core_refuse(c, function, "%s = %g is not finite", name, x[i]);
     }
-    if (n) memcpy(c->record + model.zone[STATE], x, n * sizeof(double));
+    if (n) memcpy(c->storage + model.zone[STATE], x, n * sizeof(double));
     c->stale = true;
     return OK;
 }
@@ -449,7 +449,7 @@ status core_set_states(struct instance *c, const double *x, size_t n, const char
 status core_get_zone(struct instance *c, enum zone zone, double *x, size_t n, const char *function) {
     if (zone_size(c, zone, x, n, function)) return FAILED;
     if ((zone == DERIVATIVE || c->mode == INITIALIZING) && core_evaluate(c, function)) return FAILED;
-    if (n) memcpy(x, c->record + model.zone[zone], n * sizeof(double));
+    if (n) memcpy(x, c->storage + model.zone[zone], n * sizeof(double));
     return OK;
 }
 
@@ -458,25 +458,25 @@ status core_get_zone(struct instance *c, enum zone zone, double *x, size_t n, co
 status core_step(struct instance *c, double t, double h, const char *function) {
     if (!isfinite(t) || !isfinite(h)) return core_refuse(c, function, "t = %g, step = %g: not finite", t, h);
     if (!(h > 0.0)) return core_refuse(c, function, "step %g is not positive", h);
-    /* A hundredth of a step, and the rounding of t by the host; beyond that it is another time. */
+    /* A hundredth of a step, and the host's rounding of t; a larger difference is another time. */
     double slack = 0.01 * h + 2.0 * DBL_EPSILON * fabs(t);
     if (fabs(t - c->t) > slack)
         return core_refuse(c, function, "step from t = %.17g, but the instance is at %.17g", t, c->t);
     if (t + h > c->stop_time + slack)
         return core_refuse(c, function, "step to %.17g passes the stop time %.17g", t + h, c->stop_time);
-    /* Hosts compute h as a difference of times: the same step comes with other last bits. Models keep
+    /* Hosts compute h as a difference of times, so the last bits of equal steps differ. Models keep
        matrices that belong to a step, so a difference within rounding of t does not count. */
     if (fabs(h - c->step) > 8.0 * DBL_EPSILON * (fabs(t) + h)) c->step = h;
     model_kernel *kernel = model.step ? model.step : model.advance;
-    int32_t code = kernel ? kernel(c->record, t, c->step) : 0;
+    int32_t code = kernel ? kernel(c->storage, t, c->step) : 0;
     c->t = t + h;
     c->stale = true;
     if (code) {
         c->mode = BROKEN;
-        return core_refuse(c, function, "the model gave up in the step from t = %.9g (code %d)", t, (int)code);
+        return core_refuse(c, function, "the model failed in the step from t = %.9g (code %d)", t, (int)code);
     }
     uint32_t first = model.zone[model.step ? OUTPUT : STATE], last = model.zone[STATE + 1];
-    uint32_t slot = core_first_not_finite(c->record, first, last);
+    uint32_t slot = core_first_not_finite(c->storage, first, last);
     if (slot < last) {
         c->mode = BROKEN;
         return not_finite(c, slot, function);

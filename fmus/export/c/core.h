@@ -1,10 +1,10 @@
-/* What an FMU does, whatever the version of FMI: instance, order of calls,
+/* The part of an FMU that both versions of FMI share: instances, order of calls,
    evaluation, stepping, snapshots, directional derivatives.
 
    Contract of every function that returns `status`
    - OK:      done.
    - FAILED:  one line went to the log. Either the call was refused and changed
-              nothing (wrong argument, wrong moment), or the model itself failed
+              nothing (wrong argument or wrong mode), or the model itself failed
               (a kernel failed, a result is not finite) and the instance is in BROKEN:
               it can still be read, reset, restored from a snapshot and freed.
    Time belongs to the host: t is the last time that the host passed, never a running sum.
@@ -73,11 +73,11 @@ struct instance {
     double t;
     double start_time;
     double stop_time;   /* +inf: not defined */
-    double step;        /* last communication step, 0: none */
+    double step;        /* last communication step; 0: none yet */
     bool stale;         /* outputs and derivatives are out of date */
-    double *record;     /* the model's record */
-    double *settings;   /* until initialisation ends: the record as set, before `initialize` */
-    double *trial;      /* room for directional derivatives */
+    double *storage;    /* the model's variables */
+    double *settings;   /* until initialisation ends: the storage as set, before `initialize` */
+    double *trial;      /* work space of directional derivatives */
     bool log_errors, log_events;
     log_sink *sink;     /* of the FMI version; calls `logger` with the host's signature */
     void (*logger)(void);
@@ -98,14 +98,14 @@ status core_set_logging(struct instance *, bool on, size_t n, const char *const 
 /* True when `operation` is legal now; otherwise writes one line to the log (none for NULL). */
 bool core_allows(struct instance *, enum operation, const char *function);
 
-/* One line in the log, "function: ...", and FAILED. */
+/* Write one line to the log, "function: ...", and return FAILED. */
 __attribute__((format(printf, 3, 4))) status core_refuse(struct instance *, const char *function,
                                                          const char *format, ...);
-/* FAILED with a line when `pointer` is NULL although `n` > 0. */
+/* Return FAILED, with a line in the log, when `pointer` is NULL although `n` > 0. */
 status core_need(struct instance *, const void *pointer, size_t n, const char *what,
                  const char *function);
 
-/* Life. The caller has asked core_allows. */
+/* Life cycle. The caller has checked core_allows. */
 status core_prepare(struct instance *, double start, bool stop_defined, double stop, const char *function);
 status core_enter_initialization(struct instance *);
 status core_exit_initialization(struct instance *, const char *function);
@@ -118,7 +118,7 @@ status core_get(struct instance *, const uint32_t *references, size_t n, double 
                 bool whole, const char *function);
 status core_set(struct instance *, const uint32_t *references, size_t n, const double *values,
                 size_t n_values, bool whole, const char *function);
-/* Outputs and derivatives up to date with time, states, inputs and parameters. */
+/* Bring outputs and derivatives up to date with time, states, inputs and parameters. */
 status core_evaluate(struct instance *, const char *function);
 
 /* Model Exchange. */
@@ -129,7 +129,7 @@ status core_get_zone(struct instance *, enum zone, double *x, size_t n, const ch
 /* Co-Simulation: inputs held over [t, t + h]; any h > 0. */
 status core_step(struct instance *, double t, double h, const char *function);
 
-/* Snapshots: a copy of the record with mode and time (snapshot.c). */
+/* Snapshots: a copy of the storage with mode and time (snapshot.c). */
 status core_snapshot(struct instance *, void **snapshot, const char *function);
 status core_restore(struct instance *, const void *snapshot, const char *function);
 void core_forget(void **snapshot);
@@ -149,15 +149,15 @@ struct direction {
 status core_differentiate(struct instance *, struct direction unknown, struct direction known, bool whole,
                           const double *seed, double *result, const char *function);
 
-/* Runs derivatives, then outputs, on any record; 0 or the kernel's code. */
-int32_t core_run(double *record, double t);
-/* The variable that owns a slot; NULL beyond the record. */
+/* Run derivatives, then outputs, on any storage; return 0 or the kernel's code. */
+int32_t core_run(double *storage, double t);
+/* Return the variable that owns a slot; NULL beyond the storage. */
 const struct variable *core_locate(uint32_t slot);
-/* Number of slots of a reference, and its variable; 0 and any variable when it is unknown. */
+/* Return the number of slots of a reference, and its variable; 0 when the reference is unknown. */
 uint32_t core_extent(uint32_t reference, bool whole, const struct variable **variable);
-/* First slot in [first, last) that is not finite, or `last`. */
-uint32_t core_first_not_finite(const double *record, uint32_t first, uint32_t last);
-/* "accel[3]", "K[2,3]", 1-based. */
+/* Return the first slot in [first, last) that is not finite, or `last`. */
+uint32_t core_first_not_finite(const double *storage, uint32_t first, uint32_t last);
+/* Write the name of a slot, "accel[3]" or "K[2,3]", counted from 1. */
 void core_slot_name(uint32_t slot, char *text, size_t size);
 
 #endif

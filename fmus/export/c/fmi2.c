@@ -1,5 +1,5 @@
-/* FMI 2.0 Co-Simulation and Model Exchange over core.h. Everything that FMI 2.0 does not share
-   with other versions is here, and nothing else. */
+/* Co-Simulation and Model Exchange of FMI 2.0 over core.h: only the functions and types of this
+   version. */
 
 #include "core.h"
 
@@ -7,7 +7,7 @@
 
 #include "fmi2Functions.h"
 
-/* Returns fmi2Error from a function that is not legal now; a NULL component gets no log line. */
+/* Return fmi2Error from a function that is not legal now; a NULL component gets no log line. */
 #define ENTER(operation)                                                                           \
     struct instance *self = c;                                                                     \
     if (!core_allows(self, operation, __func__)) return fmi2Error
@@ -36,7 +36,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
     DONE(core_set_logging(self, on != fmi2False, n, categories, __func__));
 }
 
-/* --- life ----------------------------------------------------------------------------------- */
+/* --- life cycle ----------------------------------------------------------------------------- */
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
@@ -89,7 +89,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     DONE(core_set(self, vr, n, value, n, false, __func__));
 }
 
-/* All variables are Real; there are none of other types to get or set. */
+/* All variables are Real: functions of other types accept only empty calls. */
 #define NO_VARIABLES(type, get, set)                                                               \
     fmi2Status get(fmi2Component c, const fmi2ValueReference vr[], size_t n, type value[]) {       \
         (void)vr, (void)value;                                                                     \
@@ -262,7 +262,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
     return fmi2OK;
 }
 
-/* The other kinds of status belong to a pending step, which there never is. */
+/* The other kinds of status belong to a pending step, and steps are synchronous. */
 #define NO_STATUS(type, get)                                                                       \
     fmi2Status get(fmi2Component c, const fmi2StatusKind kind, type *value) {                      \
         (void)value;                                                                               \

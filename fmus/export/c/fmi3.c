@@ -1,11 +1,11 @@
-/* FMI 3.0 Co-Simulation and Model Exchange over core.h. Everything that FMI 3.0 does not share with
-   other versions is here, and nothing else. Variables are Float64, arrays as arrays. */
+/* Co-Simulation and Model Exchange of FMI 3.0 over core.h: only the functions and types of this
+   version. Variables are Float64, arrays as arrays. */
 
 #include "core.h"
 
 #include "fmi3Functions.h"
 
-/* Returns fmi3Error from a function that is not legal now; a NULL instance gets no log line. */
+/* Return fmi3Error from a function that is not legal now; a NULL instance gets no log line. */
 #define ENTER(operation)                                                                           \
     struct instance *self = c;                                                                     \
     if (!core_allows(self, operation, __func__)) return fmi3Error
@@ -25,7 +25,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const f
     DONE(core_set_logging(self, on, n, categories, __func__));
 }
 
-/* --- life ----------------------------------------------------------------------------------- */
+/* --- life cycle ----------------------------------------------------------------------------- */
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
                                           fmi3Boolean visible, fmi3Boolean logging,
@@ -44,7 +44,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
         core_new(name, token, CO_SIMULATION, logging, sink, (void (*)(void))log, environment);
     if (self && event_mode) {
         self->log_errors = true; /* the NULL that follows gives no reason */
-        core_refuse(self, __func__, "event mode is not there (hasEventMode is false)");
+        core_refuse(self, __func__, "event mode is not supported (hasEventMode is false)");
         core_free(self);
         return NULL;
     }
@@ -87,7 +87,7 @@ fmi3Status fmi3Reset(fmi3Instance c) {
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) {
     ENTER(RESET);
-    REFUSE("there are no structural parameters to configure");
+    REFUSE("the FMU has no structural parameters to configure");
 }
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
@@ -109,7 +109,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     DONE(core_set(self, vr, n, values, n_values, true, __func__));
 }
 
-/* All variables are Float64; there are none of other types to get or set. */
+/* All variables are Float64: functions of other types accept only empty calls. */
 #define NOTHING(operation)                                                                         \
     (void)vr, (void)values, (void)n_values;                                                        \
     ENTER(operation);                                                                              \
@@ -152,7 +152,7 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
     (void)vr, (void)n;
     ENTER(GET_SNAPSHOT);
-    REFUSE("dependencies stand in modelDescription.xml (providesPerElementDependencies is false)");
+    REFUSE("dependencies are in modelDescription.xml (providesPerElementDependencies is false)");
 }
 
 fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t dependent[],
@@ -160,7 +160,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference vr, si
                                        fmi3DependencyKind kinds[], size_t n) {
     (void)vr, (void)dependent, (void)independents, (void)independent, (void)kinds, (void)n;
     ENTER(GET_SNAPSHOT);
-    REFUSE("dependencies stand in modelDescription.xml (providesPerElementDependencies is false)");
+    REFUSE("dependencies are in modelDescription.xml (providesPerElementDependencies is false)");
 }
 
 /* --- snapshots and derivatives -------------------------------------------------------------- */
@@ -214,10 +214,10 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
     (void)unknowns, (void)n_unknowns, (void)knowns, (void)n_knowns;
     (void)seed, (void)n_seed, (void)sensitivity, (void)n_sensitivity;
     ENTER(DIFFERENTIATE);
-    REFUSE("there are no adjoint derivatives (providesAdjointDerivatives is false)");
+    REFUSE("adjoint derivatives are not supported (providesAdjointDerivatives is false)");
 }
 
-/* --- events: there are none ----------------------------------------------------------------- */
+/* --- events: the model has none ------------------------------------------------------------- */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
     ENTER(ENTER_EVENT);
@@ -251,7 +251,7 @@ fmi3Status fmi3EnterStepMode(fmi3Instance c) {
     (void)vr, (void)n;                                                                             \
     __VA_ARGS__;                                                                                   \
     ENTER(GET_SNAPSHOT);                                                                           \
-    REFUSE("there are no clocks")
+    REFUSE("the FMU has no clocks")
 
 fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Clock values[]) {
     NO_CLOCKS((void)values);
@@ -303,7 +303,7 @@ fmi3Status fmi3SetShiftFraction(fmi3Instance c, const fmi3ValueReference vr[], s
 fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time) {
     (void)clock, (void)time;
     ENTER(GET_SNAPSHOT);
-    REFUSE("there are no clocks");
+    REFUSE("the FMU has no clocks");
 }
 
 /* --- Model Exchange ------------------------------------------------------------------------- */

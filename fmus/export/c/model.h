@@ -1,11 +1,11 @@
 /* The contract between an exported model and the FMI front end.
 
-   A model is one record of `n_slots` doubles in contiguous memory and up to five
-   kernels that read and write it (slots behind the last zone belong to the kernels alone).
+   A model is a storage of `n_slots` doubles in contiguous memory and up to five
+   kernels that read and write it (only kernels use the slots after the last zone).
    `fmus/export/link.py` writes one C file for each model, which defines `model`; no other part
    of the front end knows which model it serves.
 
-   The record is a sequence of zones, in this order:
+   The storage is a sequence of zones, in this order:
        inputs | outputs | states | derivatives | locals | parameters
    `derivatives` has the order and the size of `states` (Continuous) or is empty
    (Block). A variable is a scalar or a row-major array at consecutive slots. */
@@ -17,8 +17,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* 0: done. Any other value: the kernel failed, and the record is not valid. */
-typedef int32_t model_kernel(double *record, double t, double h);
+/* Return 0, or another value if the kernel failed and the storage is not valid. */
+typedef int32_t model_kernel(double *storage, double t, double h);
 
 enum zone { INPUT, OUTPUT, STATE, DERIVATIVE, LOCAL, PARAMETER, ZONES };
 
@@ -29,7 +29,7 @@ struct variable {
     uint32_t first; /* first slot */
     uint32_t size;  /* number of slots, at least 1 */
     uint8_t zone;   /* enum zone */
-    bool listed;    /* is in the modelDescription; others have no value reference */
+    bool listed;    /* in the modelDescription; others have no value reference */
     double min, max;
 };
 
@@ -41,7 +41,7 @@ struct model {
     const struct variable *variables; /* by ascending `first` */
     uint32_t n_variables;
     const void *start;                /* n_slots doubles, any alignment */
-    model_kernel *initialize, *derivatives, *outputs, *advance, *step; /* NULL = none */
+    model_kernel *initialize, *derivatives, *outputs, *advance, *step; /* NULL: none */
 };
 
 extern const struct model model;

@@ -39,23 +39,23 @@ static status check_direction(struct instance *c, struct direction d, bool whole
                        unknowns ? "unknowns" : "knowns", total);
 }
 
-/* Adds e v to the knowns in `record`. */
-static void move(double *record, struct direction known, bool whole, const double *seed, double e) {
+/* Add e v to the knowns in `storage`. */
+static void move(double *storage, struct direction known, bool whole, const double *seed, double e) {
     const struct variable *v;
     for (size_t i = 0; i < known.n; i++)
         for (uint32_t k = 0, size = core_extent(known.references[i], whole, &v); k < size; k++)
-            record[known.references[i] + k] += e * *seed++;
+            storage[known.references[i] + k] += e * *seed++;
 }
 
-/* Adds w times the unknowns in `record` to `result`. */
-static void collect(const double *record, struct direction unknown, bool whole, double w, double *result) {
+/* Add w times the unknowns in `storage` to `result`. */
+static void collect(const double *storage, struct direction unknown, bool whole, double w, double *result) {
     const struct variable *v;
     for (size_t i = 0; i < unknown.n; i++)
         for (uint32_t k = 0, size = core_extent(unknown.references[i], whole, &v); k < size; k++)
-            *result++ += w * record[unknown.references[i] + k];
+            *result++ += w * storage[unknown.references[i] + k];
 }
 
-/* The width that moves no known by more than a thousandth of its size; +inf for no direction at all. */
+/* Return the width that moves no known by more than a thousandth of its size; +inf for a zero seed. */
 static double width_of(const double *point, struct direction known, bool whole, const double *seed) {
     const struct variable *v;
     double width = INFINITY;
@@ -79,7 +79,7 @@ status core_differentiate(struct instance *c, struct direction unknown, struct d
     for (size_t i = 0; i < known.n_values; i++)
         if (!isfinite(seed[i])) return core_refuse(c, function, "seed %g is not finite", seed[i]);
     bool early = c->mode == INITIALIZING;
-    const double *point = early ? c->settings : c->record;
+    const double *point = early ? c->settings : c->storage;
     double width = width_of(point, known, whole, seed);
     for (size_t i = 0; i < unknown.n_values; i++) result[i] = 0.0;
     if (!isfinite(width)) return OK;
@@ -90,7 +90,7 @@ status core_differentiate(struct instance *c, struct direction unknown, struct d
         int32_t code = early && model.initialize ? model.initialize(c->trial, c->t, 0.0) : 0;
         if (!code) code = core_run(c->trial, c->t);
         if (code)
-            return core_refuse(c, function, "the equations gave up beside t = %.9g (code %d)", c->t, (int)code);
+            return core_refuse(c, function, "the equations failed near t = %.9g (code %d)", c->t, (int)code);
         collect(c->trial, unknown, whole, weight[k] / width, result);
     }
     uint32_t bad = core_first_not_finite(result, 0, (uint32_t)unknown.n_values);

@@ -1,8 +1,8 @@
-/* Snapshots: the record with mode and time, in one piece of memory. Until initialisation ends the
-   record holds the settings, so that `initialize` runs again on the restored settings; afterwards
-   it is the live record. Outputs and derivatives are computed again after a restore.
+/* Snapshots: the storage with mode and time, in one piece of memory. Until initialisation ends the
+   storage holds the settings, so that `initialize` runs again on the restored settings; afterwards
+   it is the live storage. Outputs and derivatives are computed again after a restore.
 
-   The serialised form is the bytes of a snapshot and their checksum: a record also holds indices
+   The serialised form is the bytes of a snapshot and their checksum: a storage also holds indices
    that the kernels compute with, so damaged bytes must not become a state. */
 
 #include "core.h"
@@ -15,7 +15,7 @@ struct snapshot {
     char token[64];
     uint32_t interface, mode;
     double t, start_time, stop_time, step;
-    double record[];
+    double storage[];
 };
 
 #define BEFORE_RUNNING (INSTANTIATED | PREPARED | INITIALIZING)
@@ -24,7 +24,7 @@ static size_t snapshot_size(void) { return sizeof(struct snapshot) + model.n_slo
 
 size_t core_serialized_size(void) { return snapshot_size() + sizeof(uint64_t); }
 
-/* FNV-1a: any change of a single byte changes it. */
+/* FNV-1a: a change of any single byte changes the sum. */
 static uint64_t checksum(const unsigned char *bytes, size_t size) {
     uint64_t sum = 0xcbf29ce484222325u;
     for (size_t i = 0; i < size; i++) sum = (sum ^ bytes[i]) * 0x100000001b3u;
@@ -35,9 +35,9 @@ static status check_snapshot(struct instance *c, const struct snapshot *s, const
     unsigned alone = s->mode & (BEFORE_RUNNING | EVENT | CONTINUOUS_TIME | STEPPING | TERMINATED | BROKEN);
     unsigned other = s->interface == MODEL_EXCHANGE ? STEPPING : EVENT | CONTINUOUS_TIME;
     if (memcmp(s->token, model.token, strlen(model.token) + 1))
-        return core_refuse(c, function, "the state is not one of %s, or is damaged", model.identifier);
+        return core_refuse(c, function, "the state does not belong to %s, or is damaged", model.identifier);
     if (s->interface != c->interface)
-        return core_refuse(c, function, "the state is one of the other interface (ME or CS)");
+        return core_refuse(c, function, "the state belongs to the other interface (Model Exchange or Co-Simulation)");
     if (alone != s->mode || !alone || (alone & (alone - 1)) || (alone & other) || !isfinite(s->t) ||
         !isfinite(s->start_time) || isnan(s->stop_time) || !isfinite(s->step))
         return core_refuse(c, function, "the state is damaged");
@@ -55,7 +55,7 @@ status core_snapshot(struct instance *c, void **snapshot, const char *function) 
     s->start_time = c->start_time;
     s->stop_time = c->stop_time;
     s->step = c->step;
-    memcpy(s->record, c->mode & BEFORE_RUNNING ? c->settings : c->record, model.n_slots * sizeof(double));
+    memcpy(s->storage, c->mode & BEFORE_RUNNING ? c->settings : c->storage, model.n_slots * sizeof(double));
     *snapshot = s;
     return OK;
 }
@@ -70,7 +70,7 @@ status core_restore(struct instance *c, const void *snapshot, const char *functi
     c->stop_time = s->stop_time;
     c->step = s->step;
     c->stale = true;
-    memcpy(c->mode & BEFORE_RUNNING ? c->settings : c->record, s->record, model.n_slots * sizeof(double));
+    memcpy(c->mode & BEFORE_RUNNING ? c->settings : c->storage, s->storage, model.n_slots * sizeof(double));
     return OK;
 }
 

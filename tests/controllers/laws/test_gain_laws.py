@@ -12,6 +12,9 @@ from controllers.laws.equivalent_control import EquivalentControlGain
 from controllers.laws.phase_plane_surface import PhasePlaneSurface
 from controllers.laws.state_dependent import StateDependentGain
 from controllers.laws.switching import HysteresisControl, SaturationControl
+from cosim import System, WiringError
+from cosim.units import definition
+from fmus.plants.oscillator import Oscillator
 from tests.cosim.blocks.drive import assert_same_bits, trace
 
 LAWS = {
@@ -49,6 +52,22 @@ def test_force_opposes_s_with_the_gain(name, values):
     large = np.abs(s) > 0.5
     assert np.array_equal(u[large], -(M * np.sign(s))[large])
     assert (np.abs(u) <= M).all()
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_u_and_M_are_forces_unless_a_unit_is_given(name):
+    """So a law cannot be wired to an acceleration by mistake; around a model of accelerations it says so."""
+    kind = type(LAWS[name]())
+    for options, unit in (({}, "N"), ({"unit": "m/s^2"}, "m/s^2")):
+        variables = kind(**options).variables
+        assert {variables[port].unit for port in ("u", "M")} == {unit}
+    with pytest.raises(WiringError, match=r"N.*m/s\^2"):
+        System({"law": kind(), "plant": Oscillator()}, [("law.u", "plant.d")])
+
+
+def test_rates_of_algorithm_2_follow_its_unit():
+    variables = AlgorithmII(unit="m/s^2").variables
+    assert definition(variables["alpha"].unit) == definition(variables["beta"].unit) == definition("m/s^3")
 
 
 def switches(s):
@@ -113,8 +132,8 @@ def test_hysteresis_keeps_its_side():
 def test_state_dependent_gain():
     """x = (3, 4): |x| = 5."""
     row = np.array([[3.0, 4.0, -1.0]])
-    assert trace(StateDependentGain(2.0, 0.5), row, 0.01, "M")[0, 0] == 11.0
-    assert trace(StateDependentGain(2.0, 0.5), row, 0.01, "u")[0, 0] == 11.0
+    assert trace(StateDependentGain(M_0=2.0, delta=0.5), row, 0.01, "M")[0, 0] == 11.0
+    assert trace(StateDependentGain(M_0=2.0, delta=0.5), row, 0.01, "u")[0, 0] == 11.0
 
 
 def test_equivalent_control_average():

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
-
 import numpy as np
 
 from cosim import Array, Block, Participant
 from cosim.codegen.kernels import kernel_addresses
-
-_KERNEL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_double)
+from cosim.core.participant import KERNEL_TIMES
+from cosim.loop.signals import KERNEL
 
 
 def drive(participant: Participant, inputs: Array, h: float, jit: bool) -> Array:
@@ -18,11 +16,10 @@ def drive(participant: Participant, inputs: Array, h: float, jit: bool) -> Array
     names = ["step"] if isinstance(p, Block) else ["derivatives", "outputs", "advance"]
     if jit:
         found = kernel_addresses(p)
-        functions = {n: _KERNEL(address) for n, address in found.items()}
+        functions = {n: KERNEL(address) for n, address in found.items()}
         kernels = {n: (lambda t, h, n=n: functions[n](p.memory.ctypes.data, t, h)) for n in found}
     else:
-        times = {"initialize": 0, "derivatives": 1, "outputs": 1, "advance": 2, "step": 2}
-        kernels = {n: (lambda t, h, n=n: getattr(p, n)(*(t, h)[: times[n]])) for n in p.kernels}
+        kernels = {n: (lambda t, h, n=n: getattr(p, n)(*(t, h)[: KERNEL_TIMES[n]])) for n in p.kernels}
     if "initialize" in kernels:
         kernels["initialize"](0.0, 0.0)
     rows = []

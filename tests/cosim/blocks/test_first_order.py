@@ -12,7 +12,7 @@ from cosim.blocks import DiscreteLowPass, FirstOrderActuator, LowPass, RecordSou
 @pytest.mark.parametrize("h", [1e-5, 0.01, 0.1, 3.0])
 def test_step_response(h):
     """u_f(t) = 1 - e^(-t / tau) at every t_k. Each step rounds three numbers below 1 and the
-    factor e^(-h/tau) damps what was before, so 100 steps stay below 100 * 3 * 1.1e-16."""
+    factor e^(-h/tau) damps earlier errors, so 100 steps stay below 100 * 3 * 1.1e-16."""
     ones = RecordSource(np.ones(101), h)
     system = System({"s": ones, "f": LowPass(0.1, n=1)}, [("s.y", "f.u[1]")])
     y = np.ravel(simulate(system, step=h, stop=100 * h, record=["f.y"])["f.y"])
@@ -91,7 +91,7 @@ class Period(Block):
         self.y = h
 
 
-def test_a_block_is_told_its_own_step():
+def test_a_block_gets_its_own_step():
     """Not the communication step: a law that integrates over its sample period must know it."""
     system = System({"a": Period(), "b": Period(sample_period=0.04), "c": Period(every=2)})
     result = simulate(system, step=0.01, stop=0.08)

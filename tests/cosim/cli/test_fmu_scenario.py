@@ -56,10 +56,7 @@ def test_a_table_between_its_rows_at_its_rows_and_outside():
     """0.1 k is below 0.3 and 0.7 in floats at some k; a row there counts all the same."""
     t = [0.25, 0.3, 0.7, 0.7, 1.05]
     rows = np.array([[1.0, 5.0], [2.0, 4.0], [3.0, 3.0], [-1.0, 2.0], [0.4, 1.0]])
-    parts = {
-        "linear": TableSource(t, rows, unit="N"),
-        "held": TableSource(t, rows, interpolation="hold"),
-    }
+    parts = {"linear": TableSource(t, rows, unit="N"), "held": TableSource(t, rows, interpolation="hold")}
     result = simulate(System(parts), step=0.1, stop=1.3)
     k = np.arange(14)
     assert result.units["linear.y"] == "N"

@@ -1,4 +1,4 @@
-"""From kernels to machine code: the cache, its key, and what cannot be compiled."""
+"""From kernels to machine code: the cache, its key, and kernels that cannot be compiled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A Continuous that moves by its advance alone: sampled coupling and Co-Simulation, nothing else."""
+"""A Continuous with only an advance: sampled coupling and Co-Simulation, nothing else."""
 
 import pytest
 
@@ -31,7 +31,7 @@ def test_it_runs_under_sampled_coupling():
 
 
 def test_stage_coupling_refuses_it():
-    with pytest.raises(CosimError, match="advance alone"):
+    with pytest.raises(CosimError, match="has only an advance"):
         simulate(System({"p": Implicit()}), step=0.1, stop=1.0, coupling="continuous")
 
 

@@ -12,7 +12,7 @@ from tests.cosim.parts import Gain, Mass
 
 
 class Pipe:
-    """A component that is none of the kinds at home."""
+    """A component of a kind that cosim does not define."""
 
     as_block = True
     every = None

@@ -1,4 +1,4 @@
-"""Which outputs depend on which inputs: exact on small kernels, never less than what numbers show."""
+"""Feedthrough: exact on small kernels, and never less than numerical differences show."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Plant(Continuous):
 
 
 class StateSpace(LinearContinuous):
-    """x' = A x + B u, y = C x: calls write only what they write."""
+    """x' = A x + B u, y = C x: a call writes its last argument only."""
 
     A = Parameter(shape=("n", "n"))
     B = Parameter(shape=("m", "n"))  # transposed
@@ -69,7 +69,7 @@ class Alias(Block):
 
 
 class EarlyReturn(Block):
-    """What follows a return under a condition depends on the condition."""
+    """Statements after a conditional return depend on its condition."""
 
     u = Input()
     w = Input()

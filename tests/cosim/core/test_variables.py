@@ -1,4 +1,4 @@
-"""Declarations that an instance resolves: units by name, default sizes, whole numbers."""
+"""Declarations that an instance resolves: units by name, default sizes, whole parameters."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import pytest
 
 from cosim import Block, Continuous, DeclarationError, Input, Output, Parameter, State
 from cosim.blocks import LowPass
-from cosim.core.variables import whole_number
 
 
 class Spring(Continuous):
@@ -88,15 +87,3 @@ def test_a_whole_parameter_stays_whole():
     with pytest.raises(DeclarationError, match=r"Counted\.bits = 2\.5 must be a whole number"):
         counted.bits = 2.5
     assert counted.bits == 12.0
-
-
-@pytest.mark.parametrize("value", [0, -1, 1.5, "3", None, float("inf"), float("nan"), 2**54, True + 0.5])
-def test_what_is_not_a_whole_number(value):
-    with pytest.raises(DeclarationError, match=r"size=.* must be a whole number, 1 or more"):
-        whole_number("size", value)
-
-
-@pytest.mark.parametrize("value", [1, 3.0, True])
-def test_whole_numbers(value):
-    assert whole_number("size", value) == int(value)
-    assert whole_number("seed", 0, least=0) == 0

@@ -1,4 +1,4 @@
-"""The doctor: good FMUs have nothing above a note, and every fault is found by the probe that is for it."""
+"""The doctor: a sound FMU gets nothing above a note, and every fault is found by its probe."""
 
 from __future__ import annotations
 
@@ -77,20 +77,20 @@ def probed(path, name: str, interface: str) -> tuple[str, str]:
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 @pytest.mark.parametrize("name", ["oscillator", "building", "accumulator"])
-def test_an_fmu_of_ours_has_nothing_above_a_note(tmp_path, name, version):
-    path = export(PARTICIPANTS[name](), tmp_path / "ours.fmu", fmi_version=version)
+def test_an_exported_fmu_has_nothing_above_a_note(tmp_path, name, version):
+    path = export(PARTICIPANTS[name](), tmp_path / "exported.fmu", fmi_version=version)
     fmu = FMU(path)
     for p in PROBES:
         for interface in p.interfaces:
             if interface != ME or fmu.has_me:
                 level, text = probed(path, p.name, interface)
-                # a block acts at every step, however long that is, and the doctor says so
+                # a block acts at every step of any length, which the doctor reports
                 acts = name == "accumulator" and p.name == "step size"
                 assert level in (["warning"] if acts else ["ok", "note"]), (p.name, interface, text)
 
 
-def test_the_model_of_the_faults_has_none_of_itself(bad):
-    """So the findings below come from the faults. The step is exact: h and h / 2 differ by rounding."""
+def test_the_model_without_a_fault_has_no_findings(bad):
+    """The findings below come from the faults. The step is exact: h and h / 2 differ by rounding."""
     planned = [(p.name, i) for p in PROBES for i in p.interfaces]
     found = {(name, interface): probed(bad("good"), name, interface) for name, interface in planned}
     assert {level for level, _ in found.values()} == {"ok"}, found
@@ -99,7 +99,7 @@ def test_the_model_of_the_faults_has_none_of_itself(bad):
 
 
 def test_the_report_is_that_of_the_probes(bad):
-    """In processes of their own: the same words, in the order of the probes."""
+    """Probes in their own processes give the same texts, in the order of the probes."""
     names = ["description", "reset", "negative step"]
     report = examine(bad("good"), only=reversed(names))
     assert [(f.probe, f.interface) for f in report.findings] == [
@@ -156,7 +156,7 @@ def test_a_fault_is_found(bad, fault, name, interfaces, level, words):
     ],
 )
 def test_a_leak_is_found(bad, fault, interfaces, level, words):
-    """In processes of their own: this one has memory that earlier tests freed, and a leak fills it first."""
+    """The probes need their own processes: here, a leak would first fill memory that earlier tests freed."""
     findings = [f for f in examine(bad(fault), only=["leak"]).findings if f.probe == "leak"]
     assert [f.interface for f in findings] == [CS, ME]
     for f in findings:
@@ -177,7 +177,8 @@ def test_a_leak_is_found(bad, fault, interfaces, level, words):
         ("hang at step", "instance", [CS], "hangs: it did not end within 6 s; it was to: do steps"),
     ],
 )
-def test_what_takes_the_process_with_it_is_found(bad, fault, name, interfaces, words):
+def test_a_fault_that_ends_or_stops_the_process_is_found(bad, fault, name, interfaces, words):
+    """The limit of 6 s begins after the start of the process; a probe that does not hang takes 0.5 s."""
     report = examine(bad(fault), only=[name], time_limit=6.0 if "hang" in fault else 60.0)
     found = {f.interface: f for f in report.findings if f.probe == name}
     for interface in interfaces:
@@ -187,7 +188,7 @@ def test_what_takes_the_process_with_it_is_found(bad, fault, name, interfaces, w
 
 
 def test_a_description_that_is_not_valid_is_found(bad, tmp_path):
-    """Initial unknowns left out: FMPy reads that, its validation of the model structure does not pass it."""
+    """FMPy reads a description without initial unknowns, which its validation of the structure refuses."""
     text = re.sub("<InitialUnknowns>.*?</InitialUnknowns>", "", description("good"))
     path = changed(tmp_path / "x.fmu", bad("good"), lambda n, old: text.encode() if n[0] == "m" else old)
     level, words = probed(path, "description", "")
@@ -209,7 +210,7 @@ def test_units_that_are_missing_or_not_known(bad, tmp_path):
 
 
 def test_dependencies_that_are_not_listed_are_named(tmp_path):
-    """i_out has none; x_alias is another name of x, which has; v_out is an array."""
+    """i_out has no list; x_alias is another name of x, which has one; v_out is an array."""
     level, words = probed(probe(tmp_path / "probe.fmu", "3.0"), "feedthrough", CS)
     assert (level, words.partition("; ")[2]) == ("note", "no dependencies listed, which means all: i_out")
 
@@ -222,7 +223,7 @@ def test_an_fmu_with_one_instance_per_process_is_not_instantiated_twice(tmp_path
 
 
 def test_python_files_of_the_current_folder_are_not_run(bad, tmp_path, monkeypatch):
-    """A probe imports json, of which an untrusted folder may hold a version of its own."""
+    """A probe imports json, and an untrusted folder may contain another json.py."""
     (tmp_path / "json.py").write_text("open('executed', 'w').close()\n")
     monkeypatch.chdir(tmp_path)
     assert probed(bad("good"), "instance", CS)[0] == "ok"

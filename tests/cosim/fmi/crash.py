@@ -9,7 +9,7 @@ from tests.cosim.fmi.probe import write_fmu
 
 
 def crash(folder: Path, fault: str = "none", interface: str = "CoSimulation") -> FMU:
-    """Build the FMU; `fault` is "FUNCTION WAY TIME", as c/crash.c says."""
+    """Build the FMU; `fault` is "FUNCTION WAY TIME", as described in c/crash.c."""
     folder.mkdir(exist_ok=True)
     text = f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="crash" guid="{fault}">

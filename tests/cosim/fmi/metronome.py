@@ -55,11 +55,11 @@ def metronome(
     """Write the FMU.
 
     clocks, clock
-        with the clocks and their variables; another clock, as XML
+        whether it has the clocks and their variables; another clock, as XML
     event_mode, early_return
-        what the model description says that it can
+        whether the model description declares the capability
     tool
-        the FMU needs this tool, which is not there
+        a tool that the FMU needs, which is not installed
     """
     variables = [*_CONTINUOUS, *(_CLOCKED if clocks else []), clock, *_TEXT]
     outputs = [v.split('valueReference="')[1].split('"')[0] for v in variables if '"output"' in v]

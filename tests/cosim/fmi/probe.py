@@ -1,4 +1,4 @@
-"""The FMUs of c/probe.h: model descriptions and the compiler; what no exporter of ours makes."""
+"""The FMUs of c/probe.h, whose features the exporter does not have: model descriptions, compiler."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ canHandleVariableCommunicationStepSize="true"/>
 
 
 def description3(once: bool) -> str:
-    """modelDescription.xml of probe3.c: what FMI 2.0 has, and numbers of all types, arrays, binary data."""
+    """modelDescription.xml of probe3.c: those of probe2.c, numbers of all types, arrays, binary data."""
     more = [
         ("f32_in", 36, "", "Float32", "input", 'start="0.5"', None),
         ("f32_out", 37, "", "Float32", "output", "", "f32_in"),
@@ -142,16 +142,17 @@ def write_fmu(path: Path, description: str, name: str, *sources: str) -> Path:
     return path
 
 
-def changed(path: Path, source: Path, change: Callable[[str, bytes], bytes]) -> Path:
-    """An FMU of another one's files, each through `change(name, content)`."""
+def changed(path: Path, source: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
+    """Write an FMU with the files of another one, each changed by `change(name, content)`; None omits it."""
     with zipfile.ZipFile(source) as original, zipfile.ZipFile(path, "w") as written:
         for name in original.namelist():
-            written.writestr(name, change(name, original.read(name)))
+            if (content := change(name, original.read(name))) is not None:
+                written.writestr(name, content)
     return path
 
 
 def probe(path: Path, version: str, *, once: bool = False) -> Path:
-    """Write the FMU; `once` says that it can be instantiated only once per process."""
+    """Write the FMU; with `once`, it can be instantiated only once per process."""
     if version == "2.0":
         return write_fmu(path, description2(once), "probe", "probe2.c")
     return write_fmu(path, description3(once), "probe", "probe3.c", "rest3.c")

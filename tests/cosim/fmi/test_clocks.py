@@ -1,6 +1,6 @@
-"""Clocks of FMI 3.0 under Co-Simulation: the FMU of c/metronome.c refuses every access out of place.
+"""Clocks of FMI 3.0 under Co-Simulation: the FMU of c/metronome.c refuses every misplaced access.
 
-What ticks at t_k is seen at t_{k+1}, as every effect of an input that is latched at t_k.
+A tick at t_k is visible at t_{k+1}, as every effect of an input that is latched at t_k.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def path(tmp_path_factory):
 
 
 def ticks(every, shift=0):
-    """How many ticks there were at the points 0 .. k - 1."""
+    """Return the number of ticks at the points 0 .. k - 1."""
     acts = (shift <= K) & ((K - shift) % every == 0)
     return np.concatenate([[0], np.cumsum(acts)[:-1]])
 
@@ -108,7 +108,7 @@ def test_a_triggered_input_clock_ticks_when_it_is_not_0(path, as_block):
 
 
 def test_recording_a_clocked_input_does_not_set_it(path):
-    """Its start value is the one that was given, recorded or not."""
+    """Its start value is the given one, recorded or not."""
     system = System({"b": Kicker(), "m": FMU(path, start={"kick_by": 5.0})}, [("b.go", "m.kick")])
     plain = simulate(system, step=H, stop=20 * H, record=["m.kicked"])
     recorded = simulate(system, step=H, stop=20 * H, record=["m.kicked", "m.kick_by"])
@@ -156,7 +156,7 @@ def test_clocks_that_are_refused(path, tmp_path):
 
 
 def test_a_snapshot_holds_clocks_events_and_texts(path):
-    """What comes after it comes again: ticks, entries into event mode, texts that are not set again."""
+    """The run after it repeats: ticks, entries into event mode, texts that are not set again."""
     start = {"word": "here", "kick_by": 2.0, "own_period": 0.5}
     system = System({n: FMU(path, start=start) for n in ("a", "b")})
     for source, target in (("wrap", "kick"), ("echo", "word")):

@@ -1,6 +1,6 @@
 """FMI 2.0 and 3.0 through one class: the same results from both versions, and the features of 3.0.
 
-The FMUs are exported by us where we can, and c/probe.h where the exporter has no such thing.
+The FMUs are exported ones, and those of c/probe.h for features that the exporter does not have.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def test_hand_written_fmus_are_valid_and_run_in_fmpy(probes, version):
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("options", [SAMPLED, STAGES], ids=["Co-Simulation", "Model Exchange"])
 def test_every_type_goes_in_and_out(probes, version, options):
-    """Stage coupling reads the outputs after the blocks, sampled coupling before: a step late."""
+    """Stage coupling reads the outputs after the blocks; sampled coupling reads them before, a step late."""
     system = System({"s": Square(sample_period=H), "p": FMU(probes[version])})
     for source, target in (("half", "r_in"), ("whole", "i_in"), ("bit", "b_in"), ("mode", "e_in")):
         system.connect(f"s.{source}", f"p.{target}")
@@ -108,7 +108,7 @@ def test_every_type_goes_in_and_out(probes, version, options):
 
 @pytest.mark.parametrize("recorded", [["i", "b"], ["b", "i"]])
 @pytest.mark.parametrize("first", VERSIONS)
-def test_negative_integers_beside_booleans(probes, first, recorded):
+def test_negative_integers_with_booleans(probes, first, recorded):
     """Int32 and the Boolean of FMI 2.0 are both C ints; each must keep its own conversion, in any order."""
     participants = {
         f"p{v[0]}": FMU(probes[v], start={"i_in": -7.0}) for v in sorted(VERSIONS, key=lambda v: v != first)
@@ -139,7 +139,7 @@ def test_state_time_and_step_events(probes, version, options):
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("options", [SAMPLED, STAGES], ids=["Co-Simulation", "Model Exchange"])
 def test_a_request_to_end_ends_the_run(probes, version, options):
-    """A normal end: the communication point that the FMU came to is the last, for all participants."""
+    """The run ends normally at the communication point that the FMU reached, for all components."""
     parts = {"a": Counter(), "p": FMU(probes[version], start={"end_at": 5 * H}), "z": Mass()}
     with pytest.warns(SimulationEndedWarning, match=r"p asked to end the simulation at t = 1\.40625 s"):
         result = simulate(System(parts), step=H, stop=9 * H, **options)
@@ -155,7 +155,7 @@ def test_a_request_to_end_ends_the_run(probes, version, options):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_request_to_end_within_a_step(probes, version, tmp_path):
-    """The FMU comes to 4.5 H of the step to 5 H: the last point of the result is 4 H."""
+    """The FMU reaches 4.5 H in the step to 5 H: the last point of the result is 4 H."""
     fmu = FMU(probes[version], start={"early_at": 4.5 * H, "end_at": 4.7 * H})
     with pytest.warns(SimulationEndedWarning):
         result = simulate(System({"p": fmu}), step=H, stop=9 * H)
@@ -185,7 +185,7 @@ def test_an_early_return_is_continued(probes):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_numbers_that_a_type_does_not_hold(probes, version):
-    """Ramp: 2 + 3 t, so 2.84375 at the first step; nothing is rounded or wrapped."""
+    """The ramp is 2 + 3 t, so 2.84375 after the first step; it is neither rounded nor wrapped."""
     for target, words in (
         ("i_in", r"p\.i_in is not a whole number from -2147483648 to 2147483647 at t = 0\.28125 s"),
         ("b_in", r"p\.b_in is not a whole number from 0 to 1 at t = 0 s"),
@@ -217,7 +217,7 @@ def test_units_strings_and_dependencies(probes, version):
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_an_fmu_that_can_be_there_only_once(tmp_path, version):
+def test_an_fmu_with_one_instance_per_process(tmp_path, version):
     path = probe(tmp_path / "once.fmu", version, once=True)
     simulate(System({"a": FMU(path)}), step=H, stop=H)
     with pytest.raises(WiringError, match=r"b and a are the same FMU, once\.fmu, .* only once per process"):
@@ -229,7 +229,7 @@ def test_an_fmu_that_can_be_there_only_once(tmp_path, version):
 
 
 def test_numbers_of_all_widths_at_their_limits(probes):
-    """NAME_out = NAME_in + 1 in the type itself; the limits that a float holds come out exactly."""
+    """NAME_out = NAME_in + 1 in the type itself; limits that fit a float are exact."""
     top = {kind: 2 ** (int(kind.lstrip("UInt")) - (kind[0] == "I")) - 2 for kind in INTEGERS}
     top |= {"Int64": 2**53 - 1, "UInt64": 2**53 - 1}
     fmu = FMU(probes["3.0"], start={f"{k}_in": v for k, v in top.items()} | {"f32_in": 0.1})
@@ -302,7 +302,7 @@ def test_aliases_are_names_of_one_variable(probes):
     """Two names of an output are two ports; two names of an input are one, which has one source."""
     system = System({"r": Ramp(), "p": FMU(probes["3.0"])})
     system.connect("r.u", "p.r_other")
-    with pytest.raises(WiringError, match=r"p\.r_in is connected already"):
+    with pytest.raises(WiringError, match=r"p\.r_in is already connected"):
         system.connect("r.u", "p.r_in")
     result = simulate(system, step=H, stop=4 * H)
     assert list(result["p.r_out"][1:]) == list(2.0 * result["r.u"][:-1])
@@ -336,7 +336,7 @@ class Twice(Block):
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("rate", [{}, {"every": 3}, {"sample_period": 0.5}])
 def test_a_block_as_fmu_acts_where_the_block_acts(tmp_path, version, rate):
-    """In the order of the connections, at its own rate, with its own step: the same bits and schedule."""
+    """The order of the connections, the rate and the step are those of the block: the same bits."""
     path = export(Twice(), tmp_path / "twice.fmu", fmi_version=version)
     runs = []
     for member in (Twice(**rate), FMU(path, as_block=True, **rate)):

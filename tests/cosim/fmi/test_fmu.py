@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from cosim import (
     simulate,
 )
 from fmus.export import DefaultExperiment, export
+from tests.cosim.fmi.probe import changed
 from tests.cosim.parts import Chain, Diverges, closed
 
 
@@ -50,7 +50,7 @@ def test_model_exchange_alone_is_integrated_in_substeps(tmp_path):
     assert result["plant.a"] == pytest.approx(exact["plant.a"], abs=1e-8)
 
 
-def test_start_values_of_parameters_and_of_inputs_that_nothing_feeds(fmu_path):
+def test_start_values_of_parameters_and_of_unconnected_inputs(fmu_path):
     """u[2] is not connected: it keeps its start value at every step."""
     plant = Chain(k=5.0, u=[0.0, 1.5])
     fmu = FMU(fmu_path, start={"k": 5.0, "u": [0.0, 1.5]})
@@ -94,40 +94,27 @@ def test_further_start_values(fmu_path):
         fmu.with_start({"w": 1.0})
 
 
-def copy_without(source, target, keep=lambda name: True, change=lambda name, data: data):
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            if keep(name):
-                new.writestr(name, change(name, old.read(name)))
-    return target
+def test_files_that_are_not_usable_fmus(fmu_path, tmp_path):
+    def is_binary(name):
+        return name.startswith("binaries/")
 
-
-def test_files_that_are_no_usable_fmu(fmu_path, tmp_path):
     before = Path.cwd()
     with pytest.raises(FMUError, match="there is no file"):
         FMU(tmp_path / "missing.fmu")
     (tmp_path / "text.fmu").write_text("no zip")
     with pytest.raises(FMUError, match="not a ZIP archive"):
         FMU(tmp_path / "text.fmu")
-    bare = copy_without(fmu_path, tmp_path / "bare.fmu", keep=lambda n: n != "modelDescription.xml")
-    with pytest.raises(FMUError, match=r"no modelDescription\.xml"):
-        FMU(bare)
-    old = copy_without(
-        fmu_path,
-        tmp_path / "old.fmu",
-        change=lambda n, d: d.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"'),
-    )
-    with pytest.raises(FMUError, match=r"FMI version 1\.0"):
-        FMU(old)
-    other = copy_without(fmu_path, tmp_path / "other.fmu", keep=lambda n: not n.startswith("binaries/"))
-    with pytest.raises(FMUError, match=r"has no binary for .*available: none"):
-        FMU(other)
-    broken = copy_without(
-        fmu_path, tmp_path / "broken.fmu", change=lambda n, d: b"" if n.startswith("binaries/") else d
-    )
+    for change, words in [
+        (lambda name, old: None if name == "modelDescription.xml" else old, r"no modelDescription\.xml"),
+        (lambda name, old: old.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"'), r"FMI version 1\.0"),
+        (lambda name, old: None if is_binary(name) else old, "has no binary for .*available: none"),
+    ]:
+        with pytest.raises(FMUError, match=words):
+            FMU(changed(tmp_path / "changed.fmu", fmu_path, change))
+    broken = changed(tmp_path / "broken.fmu", fmu_path, lambda name, old: b"" if is_binary(name) else old)
     with pytest.raises(FMUError, match="cannot be loaded"):
         simulate(closed(FMU(broken)), step=0.1, stop=1.0)
-    assert Path.cwd() == before  # FMPy would leave us in the folder of the library
+    assert Path.cwd() == before  # FMPy would stay in the folder of the library
 
 
 def test_stage_coupling_needs_model_exchange(tmp_path):
@@ -137,7 +124,7 @@ def test_stage_coupling_needs_model_exchange(tmp_path):
 
 
 def test_many_runs_in_one_process_leave_nothing_behind(fmu_path):
-    """300 runs: no more open files, and less memory than an instance each would take (some 100 kB)."""
+    """After 300 runs, no more files are open, and the memory has grown by less than an instance per run."""
     system = closed(FMU(fmu_path))
 
     def used() -> tuple[int, int]:
@@ -154,7 +141,7 @@ def test_many_runs_in_one_process_leave_nothing_behind(fmu_path):
     assert more_memory - memory < 10_000_000
 
 
-def test_what_an_fmu_logs_is_part_of_the_error(tmp_path):
+def test_the_log_of_an_fmu_is_part_of_the_error(tmp_path):
     path = tmp_path / "diverges.fmu"
     export(Diverges(), path, interfaces=["ModelExchange"], experiment=DefaultExperiment(stop=0.1, step=0.01))
     with pytest.raises(SimulationError, match=r"(?s)plant failed at t = .*fmi2Error.*der\(x\) became inf"):
@@ -162,7 +149,7 @@ def test_what_an_fmu_logs_is_part_of_the_error(tmp_path):
 
 
 def test_lines_of_the_log_go_to_the_fmu_that_they_come_from(capsys):
-    """FMPy's native proxy has room for one logger; with one for each FMU the last one got everything."""
+    """FMPy's native proxy has room for one logger; with one per FMU, the last one would get all lines."""
     import gc
 
     from cosim.fmi.instance.fmi2_log import callbacks
@@ -181,6 +168,6 @@ def test_lines_of_the_log_go_to_the_fmu_that_they_come_from(capsys):
     assert (a.lines, b.lines) == ([(1, b"of a")], [(3, b"of b")])
     del b
     gc.collect()
-    of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"too late")  # an FMU that speaks when it is gone
+    of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"too late")  # its instance is gone
     of_a.logger(None, b"another", 1, b"", b"of FMPy")
     assert capsys.readouterr().out == "[WARNING] of FMPy\n"

@@ -1,7 +1,7 @@
-"""Chapter 4 with its blocks as FMUs of their own: surface, gain law and noise, bit for bit.
+"""Chapter 4 with its blocks as FMUs: surface, gain law and noise, bit for bit.
 
-A switching controller amplifies the last bit of anything, and these trajectories switch at
-every step or so: one bit off, or one sample late, and they part.
+A switching controller amplifies the last bit of every signal, and these trajectories switch at
+almost every step: with one wrong bit, or one late sample, they diverge.
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ def test_options_that_exclude_each_other():
         ({"solver": "ode4", "tolerance": 1e-3}, 'tolerance belongs to solver="cvode", and ode4 has fixed'),
         ({"tolerance": 0.0}, r"tolerance=0\.0 must be a number from 1e-14 to 1"),
         ({"solver": "ode4", "substeps": 0}, "substeps=0 must be a whole number"),
+        ({"solver": "ode4", "substeps": 2.5}, r"substeps=2\.5 must be a whole number"),
     ]:
         with pytest.raises(FMUError, match=words):
             ModelExchange(**options)

@@ -1,4 +1,4 @@
-"""Loading FMUs: by many threads at once, and those that need a tool that is not there."""
+"""Loading FMUs: by many threads at once, and FMUs whose tool is not installed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.cosim.fmi.probe import changed, probe
 
 
 def test_threads_load_one_at_a_time(tmp_path, monkeypatch):
-    """FMPy changes the folder of the process while it loads: two at once would leave it elsewhere."""
+    """FMPy changes the folder of the process while it loads: two at once would leave another folder."""
     paths = [probe(tmp_path / f"{i}.fmu", version) for i, version in enumerate(["2.0", "3.0"] * 4)]
     load = ctypes.cdll.LoadLibrary
 
@@ -44,8 +44,8 @@ def test_an_fmu_that_needs_its_tool_says_so(tmp_path):
         simulate(System({"m": FMU(path)}), step=0.25, stop=1.0)
 
 
-def test_variables_that_are_no_reals_are_discrete_where_it_is_not_said(tmp_path):
-    """pythonfmu leaves it out, which FMI 2.0 forbids and FMI 3.0 does not; there is nothing else to mean."""
+def test_variables_other_than_reals_are_discrete_by_default(tmp_path):
+    """pythonfmu omits the variability, which FMI 2.0 forbids and FMI 3.0 allows; it must be "discrete"."""
     whole = probe(tmp_path / "whole.fmu", "2.0")
 
     def without(name, old):

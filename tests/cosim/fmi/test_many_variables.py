@@ -1,4 +1,4 @@
-"""An FMU of very many variables: read, inspected, wired and run; whatever is quadratic would not end here."""
+"""An FMU of very many variables is read, inspected, connected and run; quadratic code would not end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.cosim.fmi.probe import write_fmu
 
 
 def many(path, n):
-    """y[i] = 2 u[i], i < n; names that no array joins."""
+    """Write an FMU y[i] = 2 u[i], i < n, whose names are not elements of arrays."""
     variables, unknowns = [], []
     for i in range(n):
         for k, (name, causality, start) in enumerate((("u", "input", 'start="1"'), ("y", "output", ""))):
@@ -30,7 +30,7 @@ def many(path, n):
 
 @pytest.mark.parametrize("n", [3_000, pytest.param(50_000, marks=pytest.mark.long)])
 def test_an_fmu_of_many_variables(tmp_path, n):
-    """Every output of `a` feeds `b`, whose outputs are 4 after two steps: 2 n variables, n connections."""
+    """Every output of `a` is connected to `b`, whose outputs are 4 after two steps: n connections."""
     path = many(tmp_path / "many.fmu", n)
     assert inspection(path).count("\n") > 2 * n
     with pytest.raises(FMUError, match=r"no variable 'part7\.u8'; did you mean"):

@@ -1,4 +1,4 @@
-"""The units that an FMU defines itself: converted by their definitions, on connections and at the start."""
+"""Units that an FMU defines: converted by their definitions, on connections and at the start."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ VERSIONS = pytest.mark.parametrize("version", ["2.0", "3.0"])
 
 
 def wire(unit: str) -> Block:
-    """Return a block y = x that reads and gives a unit."""
+    """Return a block y = x whose ports have a unit."""
 
     class Wire(Block):
         x = Input(unit=unit, start=3.0)
@@ -25,7 +25,7 @@ def wire(unit: str) -> Block:
 
 
 def with_unit(path, version, name, base):
-    """Write the probe, r_out = 2 r_in, with a unit of its own in the place of N."""
+    """Write the probe, r_out = 2 r_in, with another unit in place of N."""
     text = (description2 if version == "2.0" else description3)(False)
     text = text.replace('<Unit name="N"><BaseUnit kg="1" m="1" s="-2"/>', f'<Unit name="{name}">{base}')
     return write_fmu(path, text.replace('unit="N"', f'unit="{name}"'), "probe", *SOURCES[version])

@@ -10,7 +10,6 @@ from cosim import Input, LinearContinuous, Output, State, System, WiringError, s
 from cosim.core.component import Component
 from cosim.core.port import Port
 from cosim.loop.instance import Integrated, MakesInstance, Stepping
-from cosim.loop.signals import RunSignals
 from cosim.run.binding import Binding
 from cosim.run.kernel_instance import KernelInstance
 from cosim.run.plan import RunPlan
@@ -18,7 +17,7 @@ from tests.cosim.parts import Gain, Mass
 
 
 def bound(system: System, **options) -> Binding:
-    return Binding(system, RunPlan(**{"step": 0.5} | options), [], RunSignals())
+    return Binding(system, RunPlan(**{"step": 0.5} | options), [])
 
 
 def floats(address: int, n: int) -> list[float]:

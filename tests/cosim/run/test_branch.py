@@ -20,7 +20,7 @@ from tests.processes import children
 def test_a_branch_that_fails_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:
-    """An isolated FMU is a process, so that what is left shows."""
+    """An isolated FMU is a process, so that a leftover instance can be counted."""
     system = closed(FMU(export(Chain(), tmp_path / "chain.fmu"), isolated=True))
     whole = simulate(system, step=0.01, stop=1.0, record=["plant.a"])
     restore = Simulation.restore

@@ -41,7 +41,7 @@ def reference(stop: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("solver", "order"), [("ode1", 1), ("ode2", 2), ("ode3", 3), ("ode4", 4)])
 def test_order_of_convergence(solver, order):
-    """The slope of log(error) over log(h) is the order; 0.2 is what the next order leaves at these steps.
+    """The slope of log(error) over log(h) is the order; 0.2 allows for the next order at these steps.
 
     A block or an input that is one stage late would bring every method down to order 1.
     """
@@ -156,7 +156,7 @@ def test_the_linear_hold_without_inputs():
 
 
 class Relay(Block):
-    """A switching law with memory, in arithmetic only: what amplifies the last bit shows it."""
+    """A switching law with memory, in arithmetic only; it amplifies a difference in the last bit."""
 
     x = Input()
     v = Input()

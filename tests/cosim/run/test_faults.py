@@ -1,4 +1,4 @@
-"""What goes wrong in a run: who, where, when, why; and what was computed until then is kept."""
+"""Faults in a run: the error names component, place, time and cause, and keeps the signals until then."""
 
 from __future__ import annotations
 
@@ -78,13 +78,13 @@ class Fails(Block):
     def step(self, t, h):
         self.y = self.x
         if t > 0.55:
-            raise ZeroDivisionError("by purpose")
+            raise ZeroDivisionError("on purpose")
 
 
 def test_an_exception_in_a_callback_reaches_the_caller():
     system = System({"ramp": Ramp(), "python": Fails()}, [("ramp.u", "python.x")])
     with pytest.raises(
-        SimulationError, match=r"python failed at t = 0\.6 s: ZeroDivisionError: by purpose"
+        SimulationError, match=r"python failed at t = 0\.6 s: ZeroDivisionError: on purpose"
     ) as caught:
         simulate(system, step=0.1, stop=5.0)
     cause = caught.value.__cause__
@@ -107,6 +107,27 @@ def test_a_raise_in_a_compiled_kernel_stops_the_run():
         simulate(System({"block": RaisesCompiled()}), step=0.1, stop=5.0)
     with pytest.raises(SimulationError, match="ValueError: compiled"):
         simulate(System({"block": RaisesCompiled()}), step=0.1, stop=5.0, jit=False)
+
+
+class FailsInside(Continuous):
+    """x' = -x until t = 0.22"""
+
+    compiled = False
+    x = State(1.0)
+
+    def derivatives(self, t):
+        if t > 0.22:
+            raise ValueError("too late")
+        self.der_x = -self.x
+
+
+@pytest.mark.parametrize(
+    ("coupling", "when"), [("sampled", r"in the step from t = 0\.2 s"), ("continuous", r"at t = 0\.25 s")]
+)
+def test_an_exception_in_derivatives_names_the_step_or_the_stage(coupling, when):
+    """ode4 evaluates the derivatives at 0.25 s; `advance` is called at 0.2 s, for the whole step."""
+    with pytest.raises(SimulationError, match=f"plant failed {when}: ValueError: too late"):
+        simulate(System({"plant": FailsInside()}), step=0.1, stop=1.0, coupling=coupling, solver="ode4")
 
 
 class BadStart(Block):
@@ -259,7 +280,7 @@ SIGNAL = """
 
 @pytest.mark.parametrize("compiled", [True, False])
 def test_ctrl_c_stops_a_run(compiled):
-    """A process of its own gets the signal; its run alone would take hours.
+    """A separate process gets the signal; its run would otherwise take hours.
 
     In callbacks Python would print the exception and run on.
     """
@@ -305,7 +326,7 @@ def test_a_linear_continuous_that_is_not_linear_is_refused(kind):
 
 
 class Remembers(Block):
-    """Python attributes beside the declared variables."""
+    """Python attributes besides the declared variables."""
 
     compiled = False
     y = Output()
@@ -401,7 +422,7 @@ def test_values_that_do_not_fit_are_refused(values, words):
         Sized(**values)
 
 
-def test_what_is_no_participant_is_refused():
+def test_an_object_that_is_not_a_component_is_refused():
     with pytest.raises(WiringError, match=r"'control' is .* give Gain\(\.\.\.\)"):
         System({"control": Gain})
     with pytest.raises(WiringError, match="cannot take part in a system"):

@@ -1,4 +1,4 @@
-"""What a run records, at which points, and that a run that goes on begins with its first point."""
+"""The recorded values and points; a run that continues begins with its first point."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The schedule as text: what happens at a communication point, in which order."""
+"""The schedule as text: the operations at a communication point, in their order."""
 
 from __future__ import annotations
 
@@ -209,8 +209,6 @@ class Adder(Block):
 
 
 def test_statistics_and_records_come_after_the_blocks():
-    from cosim import simulate
-
     system = System({"i": Integrator(), "sum": Adder()}, [("i.x", "sum.a"), ("i.y", "sum.b")])
     result = simulate(system, step=0.5, stop=1.0, record=["sum.u"], statistics=["i.x", "sum.u"], decimation=2)
     assert result.schedule.splitlines()[-5:] == [
@@ -223,7 +221,7 @@ def test_statistics_and_records_come_after_the_blocks():
 
 
 class Quotient(Continuous):
-    """x' = -x, y = x / u: no number before u is there"""
+    """x' = -x, y = x / u: not a number before u is set"""
 
     u = Input()
     x = State(2.0)

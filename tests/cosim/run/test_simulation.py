@@ -1,4 +1,4 @@
-"""A simulation that is carried on, returned to a snapshot, and branched: the same numbers, bit for bit."""
+"""A simulation that is continued, restored and branched gives the same numbers, bit for bit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.cosim.parts import Chain, Gain, Mass
 
 
 class Remembers(Block):
-    """A block in Python: a running sum beside the declared variables."""
+    """A block in Python: a list of its inputs besides the declared variables."""
 
     compiled = False
     x = Input()
@@ -112,7 +112,7 @@ def test_a_snapshot_is_returned_to_exactly_and_a_branch_goes_its_own_way(kind, c
         simulation.run(0.3)
         there = simulation.snapshot()
         first = simulation.run(0.9)
-        for _ in range(2):  # as often as one likes
+        for _ in range(2):  # any number of times
             simulation.restore(there)
             assert simulation.time == there.time == 0.3
             again = simulation.run(0.9)
@@ -194,7 +194,7 @@ class Root(Continuous):
 
 
 def test_an_fmu_that_failed_is_taken_back(tmp_path):
-    """At t = 1.1 the input is negative; what the FMU gives is refused, and its state returns."""
+    """At t = 1.1 the input is negative; the output of the FMU is refused, and its state is restored."""
     system = System({"f": Falling(), "r": FMU(export(Root(), tmp_path / "root.fmu"))}, [("f.y", "r.u")])
     with Simulation(system, step=0.1, record=["r.y"]) as simulation:
         simulation.run(0.5)
@@ -206,7 +206,7 @@ def test_an_fmu_that_failed_is_taken_back(tmp_path):
         assert np.array_equal(again["r.y"], caught.value.result["r.y"][: len(again.time)])
 
 
-def test_participants_that_cannot_keep_their_state_are_named(tmp_path):
+def test_components_that_cannot_keep_their_state_are_named(tmp_path):
     system = System({"theirs": FMU(probe(tmp_path / "p.fmu", "2.0")), "m": Mass()})
     with Simulation(system, step=0.1) as simulation:
         simulation.run(0.2)
@@ -218,7 +218,7 @@ def test_participants_that_cannot_keep_their_state_are_named(tmp_path):
 def test_running_back_is_refused():
     with Simulation(System({"m": Mass()}), step=0.1) as simulation:
         simulation.run(0.5)
-        with pytest.raises(TimeError, match=r"the simulation is at 0\.5 s already"):
+        with pytest.raises(TimeError, match=r"the simulation is already at 0\.5 s"):
             simulation.run(0.4)
         with pytest.raises(TimeError, match=r"0\.64 s is 6\.4 communication steps"):
             simulation.run(0.64)
@@ -246,7 +246,7 @@ def test_without_records_there_are_no_recorded_times():
 
 
 def test_a_snapshot_of_another_simulation_is_refused(paths):
-    """Unless that has the same participants and options, and what it keeps therefore the same meaning."""
+    """Unless it has the same components and options, so that the saved values have the same meaning."""
 
     def standing(plant, **options) -> Simulation:
         return Simulation(System({"p": plant}), **({"step": 0.1} | options))
@@ -267,7 +267,7 @@ def test_a_snapshot_of_another_simulation_is_refused(paths):
     ):
         with (
             standing(plant, **options) as simulation,
-            pytest.raises(SnapshotError, match=r"the snapshot at t = 0\.5 s is of another simulation"),
+            pytest.raises(SnapshotError, match=r"the snapshot at t = 0\.5 s belongs to another simulation"),
         ):
             simulation.restore(there)
     for options in ({"jit": False}, {"coupling": "continuous"}):
@@ -277,7 +277,7 @@ def test_a_snapshot_of_another_simulation_is_refused(paths):
         simulation.restore(None)
 
 
-def test_an_fmu_that_is_there_once_is_not_branched(paths, tmp_path):
+def test_an_fmu_that_can_be_instantiated_once_is_not_branched(paths, tmp_path):
     """A second simulation would be a second instance in this process."""
 
     def once(name: str, content: bytes) -> bytes:

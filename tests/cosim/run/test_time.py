@@ -1,4 +1,4 @@
-"""Time is the integer k: what runs when, with which t, and which sample it sees."""
+"""Time is the integer k: the order of the calls, the t of each call, and the sample that it sees."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_what_does_not_fit_the_grid_is_refused(options, words):
 
 
 @pytest.mark.parametrize("period", [0.15, 0.05, 0.1000001, 0.3000001])
-def test_a_sample_period_that_is_no_multiple_is_refused_never_rounded(period):
+def test_a_sample_period_that_is_not_a_multiple_is_refused_never_rounded(period):
     with pytest.raises(TimeError, match=r"ramp: sample period of .* whole number"):
         simulate(System({"ramp": Ramp(sample_period=period)}), step=0.1, stop=1.2)
 
@@ -207,7 +207,7 @@ def test_a_count_of_steps_beyond_the_precision_of_the_ratio_passes():
 
 
 def test_decimal_steps_pass():
-    """0.3 / 0.1 and 900 / 0.001 are no whole numbers in binary; they are meant to be."""
+    """0.3 / 0.1 and 900 / 0.001 are not whole numbers in binary; they are meant to be."""
     for step, period, stop in ((0.1, 0.3, 1.2), (0.001, 0.007, 900.004), (1 / 3, 1.0, 7.0)):
         system = System({"ramp": Ramp(sample_period=period)})
         assert simulate(system, step=step, stop=stop, record=[], statistics=[]).steps == round(stop / step)
@@ -221,7 +221,7 @@ def test_runs_repeat_bit_for_bit_and_leave_the_participants_alone():
     assert plant.x == 0.8
 
 
-def test_a_block_is_told_its_own_period_and_participants_the_step():
+def test_a_block_gets_its_own_period_and_a_continuous_the_step():
     """h of a block that acts every 3 points is 3 steps; 0.25 and 0.75 are exact."""
     system = System({"fast": Counter(), "slow": Counter(every=3)})
     result = simulate(system, step=0.25, stop=2.0)

@@ -8,16 +8,7 @@ import pytest
 
 from cosim import Block, CosimError, Input, read_ssp
 from tests.cosim.parts import Gain
-from tests.cosim.ssp.packages import (
-    GAIN,
-    SPACES,
-    TWO,
-    binding,
-    bindings,
-    component,
-    connection,
-    system,
-)
+from tests.cosim.ssp.packages import GAIN, SPACES, TWO, binding, bindings, component, connection, system
 
 MAPPING = (
     '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
@@ -146,16 +137,10 @@ UNSUITABLE = [
         r"component g: e_in has no item 'onn'; did you mean 'on'",
     ),
     (
-        nested(
-            connection("in", "k.x", NOTE.format(DELAY)),
-            connection("g.u", "sub.in"),
-        ),
+        nested(connection("in", "k.x", NOTE.format(DELAY)), connection("g.u", "sub.in")),
         r"g\.u -> sub\.in -> sub\.k\.x is delayed on a part of its way, .*; delay a direct connection",
     ),
-    (
-        system(component("g", "Gain", GAIN, NOTE.format(EVERY))),
-        r"component g: '2\.5' must be a whole number",
-    ),
+    (system(component("g", "Gain", GAIN, NOTE.format(EVERY))), r"component g: '2\.5' must be a whole number"),
     (
         system(component("g", "Gain", GAIN, NOTE.format(EVERY.replace("2.5", "")))),
         r"component g: '' must be one whole number",
@@ -168,10 +153,7 @@ UNSUITABLE = [
         nested(connection("in", "out"), connection("sub.out", "sub.in") + connection("sub.out", "g.x")),
         r"sub\.out feeds itself through connectors of systems",
     ),
-    (
-        system(component("g", "Gain", ["x input", "x output"])),
-        r"it\.ssp: g has two connectors 'x'",
-    ),
+    (system(component("g", "Gain", ["x input", "x output"])), r"it\.ssp: g has two connectors 'x'"),
 ]
 
 
@@ -193,10 +175,7 @@ def test_a_unit_that_is_not_one_is_named(package):
 #: broken in a way that the schemas refuse too
 BROKEN = [
     ("", r"it\.ssp has no System element"),
-    (
-        system(TWO, connection("g.u", "h.x", LINEAR.format("two"))),
-        r"g\.u - h\.x: 'two' must be numbers",
-    ),
+    (system(TWO, connection("g.u", "h.x", LINEAR.format("two"))), r"g\.u - h\.x: 'two' must be numbers"),
     (system(TWO, connection("g.u", "h.x", LINEAR.format("1 2"))), r"g\.u - h\.x: '1 2' must be one number"),
     (one('<ssv:Parameter name="K"/>'), r"parameter 'K' has no value; give an element"),
     (one(TEXT.replace("String", "Integer")), r"parameter 'K': 'a' must be a whole number"),

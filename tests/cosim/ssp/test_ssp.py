@@ -98,11 +98,7 @@ UNITS = (
         # 3 shove = 750 N = (750 - 10) / 0.5 nudge = 1480 nudge; then factor 2, offset 7
         ({}, "", 1480.0),
         ({}, '<ssc:LinearTransformation factor="2" offset="7"/>', 2967.0),
-        (
-            {"suppressUnitConversion": "true"},
-            '<ssc:LinearTransformation factor="2" offset="7"/>',
-            13.0,
-        ),
+        ({"suppressUnitConversion": "true"}, '<ssc:LinearTransformation factor="2" offset="7"/>', 13.0),
         ({"suppressUnitConversion": "true"}, "", 3.0),
     ],
 )

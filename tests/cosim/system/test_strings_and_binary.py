@@ -1,4 +1,4 @@
-"""Strings and binary data while a run goes on: handed from FMU to FMU, and recorded."""
+"""Strings and binary data during a run: passed from FMU to FMU, and recorded."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_connections_that_are_refused(path):
     with pytest.raises(WiringError, match="a String cannot be delayed or transformed"):
         system.connect("a.echo", "b.word", initial=0.0)
     system.connect("a.echo", "b.word")
-    with pytest.raises(WiringError, match=r"b\.word is connected already, to a\.echo"):
+    with pytest.raises(WiringError, match=r"b\.word is already connected to a\.echo"):
         system.connect("a.echo", "b.word")
-    with pytest.raises(WiringError, match=r"a\.echo is a String; statistics are of numbers"):
+    with pytest.raises(WiringError, match=r"a\.echo is a String; statistics need numbers"):
         simulate(system, step=H, stop=H, statistics=["a.echo"])

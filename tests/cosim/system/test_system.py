@@ -37,12 +37,12 @@ def test_a_scalar_feeds_every_element_an_array_only_its_like():
 
 
 WRONG = [
-    ("plnt.x", "g.x", r"the system has no participant 'plnt'; did you mean 'plant'"),
+    ("plnt.x", "g.x", r"the system has no component 'plnt'; did you mean 'plant'"),
     ("plant.xx", "g.x", r"plant has no output 'xx'.*available: a, x, v"),
     ("a.acel", "g.x", r"a has no output 'acel'; did you mean 'accel'"),
-    (None, "g.x", r"None must be a port, written as text: 'participant\.port'"),
+    (None, "g.x", r"None must be a port, written as text: 'component\.port'"),
     ("plant.x", 1, r"1 must be a port"),
-    ("plant", "g.x", r"'plant' is not a port; write participant.port"),
+    ("plant", "g.x", r"'plant' is not a port; write component.port"),
     ("plant.u", "g.x", r"plant.u is an input, not an output"),
     ("plant.x", "g.u", r"g.u is an output, not an input"),
     ("plant.m", "g.x", r"plant has no output 'm'"),
@@ -67,12 +67,12 @@ def test_wrong_connections_say_where_what_and_the_remedy(source, target, words):
     assert system.connections == []
 
 
-def test_what_is_no_system_is_refused():
+def test_a_system_that_is_not_one_is_refused():
     with pytest.raises(WiringError, match=r"'plant\.fmu' must be a System"):
         simulate("plant.fmu", step=0.1, stop=1.0)
     with pytest.raises(WiringError, match="must be a System"):
         schedule(None, step=0.1)
-    with pytest.raises(WiringError, match="must be a dictionary of participants"):
+    with pytest.raises(WiringError, match="must be a dictionary of components"):
         System([Mass()])
     with pytest.raises(WiringError, match=r"\('m\.x',\) must be a connection, such as"):
         System({"m": Mass()}, [("m.x",)])
@@ -82,9 +82,9 @@ def test_what_is_no_system_is_refused():
 
 def test_an_input_has_one_source():
     system = System({"a": Three(), "b": Three(), "ramp": Ramp()}, [("a.y[1:2]", "b.x[2:3]")])
-    with pytest.raises(WiringError, match=r"b\.x is connected already, to a\.y\[1:2\]"):
+    with pytest.raises(WiringError, match=r"b\.x is already connected to a\.y\[1:2\]"):
         system.connect("ramp.u", "b.x")
-    with pytest.raises(WiringError, match=r"b\.x\[3\] is connected already"):
+    with pytest.raises(WiringError, match=r"b\.x\[3\] is already connected"):
         system.connect("ramp.u", "b.x[3]")
     system.connect("ramp.u", "b.x[1]")
 
@@ -161,7 +161,7 @@ def test_units_that_do_not_fit_are_refused(source, target, words):
 
 
 @given(text=st.text(alphabet="ab.xyM[]:,0123 -é", max_size=14))
-def test_any_text_is_a_port_or_an_error_of_ours(text):
+def test_any_text_is_a_port_or_a_cosim_error(text):
     system = System({"a": Three(), "b": Gain()})
     for direction in ("input", "output"):
         try:
@@ -228,14 +228,14 @@ def test_random_wirings_equal_a_plain_evaluation(data, n):
 
 
 @pytest.mark.parametrize("name", ["", "a b", "1a", "a.b", None])
-def test_participant_names(name):
+def test_component_names(name):
     with pytest.raises(CosimError, match="letters, digits and underscores"):
         System({name: Gain()})
 
 
-def test_a_participant_stands_in_a_system_once():
+def test_a_component_takes_part_once():
     gain = Gain()
     with pytest.raises(WiringError, match="'b' is the same object"):
         System({"a": gain, "b": gain})
-    with pytest.raises(WiringError, match="'a' already"):
+    with pytest.raises(WiringError, match="already has a component 'a'"):
         System({"a": gain}).add("a", Gain())

@@ -18,8 +18,8 @@ from functools import lru_cache
 import numpy as np
 
 from controllers.adaptive.scwnn import SCWNN
+from controllers.design.design_model import DesignModel
 from controllers.design.reduction import dominant_modes
-from controllers.design.state_space import StateSpace as Model
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
 from controllers.laws.equivalent_force import EquivalentForce, StateSurface
 from controllers.laws.equivalent_force import design as equivalent_force
@@ -67,13 +67,18 @@ def classes() -> dict[str, type[Participant]]:
             module = importlib.import_module(entry.name)
             for value in vars(module).values():
                 own = isinstance(value, type) and value.__module__ == entry.name
-                if own and issubclass(value, Participant):
+                if own and issubclass(value, Participant) and not _is_shared_base(value):
                     found[f"{entry.name}.{value.__name__}"] = value
     return found
 
 
+def _is_shared_base(kind: type[Participant]) -> bool:
+    """Tell whether a class only holds what its subclasses share: a private one that has subclasses."""
+    return kind.__name__.startswith("_") and bool(kind.__subclasses__())
+
+
 @lru_cache(maxsize=1)
-def model() -> Model:
+def model() -> DesignModel:
     """A tower with damper: four states, and two accelerations, of the top and of the damper."""
     coupled, n = with_damper(small_tower(), Damper()), small_tower().dof
     return dominant_modes(

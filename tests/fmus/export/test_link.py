@@ -179,6 +179,6 @@ def test_a_kernel_that_gives_up_is_an_error(tmp_path: Path, monkeypatch: pytest.
     assert h.set(("u", 6.0)) == OK
     assert h.step(0.0, 0.5) == ERROR
     assert h.log == [
-        (ERROR, "logStatusError", "fmi2DoStep: the model gave up in the step from t = 0 (code 7)")
+        (ERROR, "logStatusError", "fmi2DoStep: the model failed in the step from t = 0 (code 7)")
     ]
     h.free()

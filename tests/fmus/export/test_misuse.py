@@ -241,7 +241,7 @@ def test_instantiation_with_wrong_arguments_gives_null_and_a_line_even_without_l
 def test_a_block_has_no_model_exchange(host_of: Callable[[str], Host]) -> None:
     h = host_of("accumulator")
     assert h.instantiate(MODEL_EXCHANGE) is None
-    assert "no Model Exchange interface" in h.log[0][2]
+    assert "has no interface for Model Exchange" in h.log[0][2]
 
 
 def test_instantiation_without_callbacks_gives_null(host_of: Callable[[str], Host]) -> None:

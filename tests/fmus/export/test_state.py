@@ -111,7 +111,7 @@ def test_a_state_of_another_model_is_refused(host_of: Callable[[str], Host]) -> 
     data = serialise(other, state)
     assert restore(h, data) == ERROR
     assert h.call("SetFMUstate", state) == ERROR
-    assert "not one of Oscillator" in h.log[-1][2]
+    assert "does not belong to Oscillator" in h.log[-1][2]
     other.call("FreeFMUstate", ctypes.byref(state))
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import fmpy
+import numpy as np
 import pyssp_standard
 from lxml import etree
 
@@ -79,6 +80,53 @@ def loop() -> System:
     system.connect("damper.f", "frame.F")
     system.connect("damper.f[2]", "watch.p", initial=3.0)
     system.connect("frame.x[2]", "watch.q", transformation=(0.1 + 0.2, 1e-3 / 3.0))
+    return system
+
+
+class Brake(Block):
+    """u = -b v"""
+
+    b = Parameter(0.8, "damping", unit="N*s/m")
+    v = Input("velocity", unit="m/s")
+    u = Output("force", unit="N")
+
+    def step(self, t: float, h: float) -> None:
+        self.u = -self.b * self.v
+
+
+class Mass(Continuous):
+    """x'' = 2 (u + d) - 3 x: nothing at rest is 1"""
+
+    u = Input("control force", unit="N")
+    d = Input("disturbance", unit="N")
+    x = State(0.0, "displacement", unit="m")
+    v = State(0.0, "velocity", unit="m/s")
+
+    def derivatives(self, t: float) -> None:
+        self.der_x = self.v
+        self.der_v = 2.0 * (self.u + self.d) - 3.0 * self.x
+
+
+class Sine(Block):
+    """d = 4 sin 3 t: zero at first"""
+
+    d = Output("force", unit="N")
+
+    def step(self, t: float, h: float) -> None:
+        self.d = 4.0 * np.sin(3.0 * t)
+
+
+def at_rest() -> System:
+    parts = {"mass": Mass(), "brake": Brake(), "sine": Sine()}
+    return System(parts, [("mass.v", "brake.v"), ("brake.u", "mass.u"), ("sine.d", "mass.d")])
+
+
+def frame() -> System:
+    """Arrays, units (kN, mm) and parameters that are not those of the FMUs' class."""
+    system = System({"frame": Frame(m=[2.5, 1.25]), "damper": Damper(g=3.0)})
+    system.connect("frame.v", "damper.v")
+    system.connect("frame.a", "damper.a")
+    system.connect("damper.f", "frame.F")
     return system
 
 

@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from cosim import Block, Continuous, Input, Output, Parameter, State, System, WiringError, read_ssp, simulate
+from cosim import Block, State, System, WiringError, read_ssp, simulate
 from fmus.packaging.other_tools import ecospy
 from fmus.packaging.ssp import PARAMETER_SET, export_ssp
-from tests.fmus.packaging.ssp_parts import Damper, Frame
+from tests.fmus.packaging.ssp_parts import Frame, Mass, at_rest, frame
 from tests.others import tool
 
 H, N = 0.005, 400
@@ -59,53 +59,6 @@ def fmpy(path: str, ports: Sequence[str]) -> np.ndarray:
     found = simulate_ssp(path, stop_time=(N - 0.5) * H, step_size=H)
     first = [0.0] * len(ports)  # row k is written after step k, with the time before it
     return np.array([first, *zip(*(found[port] for port in ports), strict=True)])
-
-
-class Brake(Block):
-    """u = -b v"""
-
-    b = Parameter(0.8, "damping", unit="N*s/m")
-    v = Input("velocity", unit="m/s")
-    u = Output("force", unit="N")
-
-    def step(self, t: float, h: float) -> None:
-        self.u = -self.b * self.v
-
-
-class Mass(Continuous):
-    """x'' = 2 (u + d) - 3 x: nothing at rest is 1"""
-
-    u = Input("control force", unit="N")
-    d = Input("disturbance", unit="N")
-    x = State(0.0, "displacement", unit="m")
-    v = State(0.0, "velocity", unit="m/s")
-
-    def derivatives(self, t: float) -> None:
-        self.der_x = self.v
-        self.der_v = 2.0 * (self.u + self.d) - 3.0 * self.x
-
-
-class Sine(Block):
-    """d = 4 sin 3 t: zero at first"""
-
-    d = Output("force", unit="N")
-
-    def step(self, t: float, h: float) -> None:
-        self.d = 4.0 * np.sin(3.0 * t)
-
-
-def at_rest() -> System:
-    parts = {"mass": Mass(), "brake": Brake(), "sine": Sine()}
-    return System(parts, [("mass.v", "brake.v"), ("brake.u", "mass.u"), ("sine.d", "mass.d")])
-
-
-def frame() -> System:
-    """Arrays, units (kN, mm) and parameters that are not those of the FMUs' class."""
-    system = System({"frame": Frame(m=[2.5, 1.25]), "damper": Damper(g=3.0)})
-    system.connect("frame.v", "damper.v")
-    system.connect("frame.a", "damper.a")
-    system.connect("damper.f", "frame.F")
-    return system
 
 
 LOOPS: dict[str, tuple[Callable[[], System], list[str]]] = {

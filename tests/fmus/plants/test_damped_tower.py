@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from controllers.design.state_space import first_order
+from controllers.design.design_model import first_order
 from cosim import Array, System, simulate
 from fmus.export import as_fmu
 from fmus.kernels.coupled_modes import coupled_modes
@@ -118,7 +118,7 @@ def test_parameters_are_settable_in_the_fmu() -> None:
     structure = small_tower()
     made = DampedTower.build(structure, [5], m=3e5, c=1e5, k=4e5, stiffness=1.15)
     fmu = as_fmu(DampedTower.build(structure, [5], m=5e5, c=2e5, k=5e5))
-    fmu.start.update({"stiffness": 1.15, "m": 3e5, "c": 1e5, "k": 4e5})
+    fmu = fmu.with_start({"stiffness": 1.15, "m": 3e5, "c": 1e5, "k": 4e5})
     results = []
     for plant in (made, fmu):
         system = System(

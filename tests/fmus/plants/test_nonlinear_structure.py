@@ -186,3 +186,11 @@ def test_only_the_laws_in_use_are_compiled():
     assert "llvm.pow" not in lower(plant)
     assert "llvm.pow" in lower(yielding_plant())
     assert type(plant) is type(NonlinearStructure.build(structure, elements[:1]))  # compiled once
+
+
+def test_a_matrix_that_cannot_be_factored_ends_the_run():
+    """Damping so negative that 4/h^2 M + 2/h C + K is not positive definite; it must not yield numbers."""
+    M, C, K = chain(3)
+    structure = Structure(M, C - 1e4 * np.eye(3), K, np.ones(3), displacements=np.eye(3))
+    with pytest.raises(SimulationError, match=r"plant\.y"):
+        shaken(NonlinearStructure.build(structure), smooth(5, 0.01), 0.01, jit=False)

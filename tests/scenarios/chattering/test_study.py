@@ -48,7 +48,7 @@ def rows():
 
 @pytest.mark.parametrize("key", NORMS)
 def test_norm_of_u(rows, key):
-    # the mean's rounding of 4001 signs is exact; 0.006 is half of the last digit of the norms
+    # 0.006 is half of the last digit of the norms, and a little for the rounding of that digit
     assert rows[key]["norm_u"] == pytest.approx(NORMS[key], abs=0.006)
 
 
@@ -68,7 +68,8 @@ def test_el_centro_needs_the_effort_that_the_thesis_prints(rows):
 def test_case_3_prints_153_and_the_first_switch_alone_costs_800(rows):
     """With u = -150 and nothing else, s = 39 - 125 t - 75 t^2 is 0 at t = 0.27 s, and 150 sqrt 28 = 794.
 
-    3 %: M grows by 2 % until then, and noise may move the switch by a sample.
+    3 %: M grows by 2 % until then, and noise may move the switch by a sample. The whole norm is 904 to
+    911 over ten seeds of the noise, so that 1 % holds for any of them.
     """
     row = rows[3, "algorithm-2", "continuous"]
     assert row["printed_norm_u"] == 153.0
@@ -76,7 +77,7 @@ def test_case_3_prints_153_and_the_first_switch_alone_costs_800(rows):
         r"153 is not reproduced: the norm is (\d+) before u first changes its sign", row["note"]
     )
     assert float(found[1]) == pytest.approx(800.0, rel=0.03)
-    assert row["norm_u"] > float(found[1])
+    assert row["norm_u"] == pytest.approx(907.0, rel=0.01)
 
 
 def test_effort_before_the_first_switch():

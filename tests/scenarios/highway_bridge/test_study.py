@@ -61,16 +61,29 @@ def test_norm_is_over_the_record():
     assert response(made_up(1.0), 2.0).norm["midspan"] == pytest.approx(0.3 / np.sqrt(2.0), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "controller", ["passive", "lqg", "scwnn", "scwnn-not-learning", "scwnn-searched", "scwnn-six-sensors"]
-)
-def test_controllers_reduce_the_motion_of_the_bearings(controller):
-    """First 8 s of El Centro: at most 0.8 of the bearings' displacement without control (found: 0.41
-    to 0.55), within 1000 kN, and the energy balance closes to 1e-4."""
+REDUCTION = {
+    # controller: largest displacement of bearings and of the midspan over those without control
+    "passive": (0.6466, 0.6775),
+    "lqg": (0.6720, 0.7247),
+    "scwnn": (0.6460, 0.6845),
+    "scwnn-not-learning": (0.6460, 0.6845),
+    "scwnn-searched": (0.4822, 0.5532),
+    "scwnn-six-sensors": (0.6562, 0.7032),
+}
+
+
+@pytest.mark.parametrize("controller", REDUCTION)
+def test_controllers_reduce_the_motion_of_bearings_and_midspan(controller):
+    """First 8 s of El Centro, within 1000 kN; the energy balance closes to 1e-4.
+
+    Over noise seeds 1 to 4 the ratios scatter by at most 0.0012; 0.003 tells the network from passive
+    dampers. Whether the network learns is another test's matter: learning changes the ratios by 0.0002.
+    """
     study = Study(record="el-centro", duration=8.0, compare=False)
     without, found = (study.metrics(replace(study, controller=c).run()) for c in ("none", controller))
-    assert found["peak bearing"][0] < 0.8 * without["peak bearing"][0]
-    assert found["peak force"][0] <= 1e6
+    ratios = [found[f"peak {n}"][0] / without[f"peak {n}"][0] for n in ("bearing", "midspan")]
+    assert ratios == pytest.approx(REDUCTION[controller], abs=0.003)
+    assert 0.0 < found["peak force"][0] <= 1e6
     assert found["energy balance, gap over input"][0] < 1e-4
 
 

@@ -7,7 +7,7 @@
 
 enum { MAX_FOLLOWING = 8, MAX_GET_ARGUMENTS = 4 };
 
-/* A get that follows every step in the loop; `index` is its call in the last request, or -1. */
+/* A get that follows every step of the loop; `index` is the number of its call in the last request, or -1. */
 struct following {
     enum function function;
     struct argument arguments[MAX_GET_ARGUMENTS];
@@ -17,17 +17,17 @@ struct following {
 struct remote {
     struct channel *channel;
     size_t capacity;                           /* bytes of channel->data */
-    int32_t (*check)(int64_t, double, double); /* not 0 when waiting is over: a crash, or Ctrl-C */
+    int32_t (*check)(int64_t, double, double); /* 0 to go on waiting; otherwise a crash, or Ctrl-C */
     bool ended;
     uint32_t number;              /* of the last request */
-    int waiting, sent;            /* calls that are not sent yet, and calls in the last request */
-    size_t used;                  /* bytes of channel->data that their arguments take */
-    struct call calls[MAX_CALLS]; /* the calls as they were packed, which the host cannot change */
+    int waiting, sent;            /* numbers of calls not sent yet, and of calls in the last request */
+    size_t used;                  /* bytes of channel->data that their arguments occupy */
+    struct call calls[MAX_CALLS]; /* the packed calls, out of the host's reach */
     double begin, end;            /* of the last step, or the time that was set */
     struct following following[MAX_FOLLOWING];
     int n_following;
     caller_log *log;
-    void *environment, *log_function;
+    void *environment, *logger;
 };
 
 static _Thread_local struct remote *next;
@@ -48,28 +48,28 @@ EXPORT struct remote *caller_open(void *memory, size_t bytes, int32_t (*check)(i
 
 EXPORT void caller_close(struct remote *r) { free(r); }
 
-/* Return how many calls of the last request were made, the failed one and the present one included. */
+/* Return the number of calls of the last request that were made, a failed and the present one included. */
 static int made(struct remote *r)
 {
     const int done = atomic_load(&r->channel->done);
     return done < 0 ? 0 : done > r->sent ? r->sent : done;
 }
 
-/* Return the status of a call of the last request; one that FMI does not define counts as an error. */
+/* Return the status of a call of the last request; a status that FMI does not define is an error. */
 static int status_of(const struct remote *r, int index)
 {
     const int status = index >= 0 ? r->channel->calls[index].status : STATUS_FATAL;
     return status >= 0 && status <= STATUS_PENDING ? status : STATUS_ERROR;
 }
 
-/* Return the function that the host is calling, or called last; -1 before it called any. */
+/* Return the function that the host is calling or called last; -1 before its first call. */
 EXPORT int caller_function(struct remote *r)
 {
     const int done = made(r);
     return done > 0 ? r->calls[done - 1].function : -1;
 }
 
-/* Return the time of that call: the beginning of its step if it is a step or follows one in the same
+/* Return the time of that call: the beginning of the step if it is a step or follows one in the same
    request, otherwise the end. */
 EXPORT double caller_time(struct remote *r)
 {
@@ -81,11 +81,13 @@ EXPORT double caller_time(struct remote *r)
 
 /* ------------------------------------------------------------------------- log */
 
-void caller_say(struct remote *r, const char *text)
+static void pass_on(const struct remote *r, int status, const char *category, const char *text)
 {
-    if (r != NULL && r->log != NULL)
-        r->log(r, STATUS_ERROR, "isolated", text);
+    if (r != NULL && r->logger != NULL)
+        r->log(r->logger, r->environment, status, category, text);
 }
+
+void caller_say(struct remote *r, const char *text) { pass_on(r, STATUS_ERROR, "isolated", text); }
 
 static void pass_on_log(struct remote *r)
 {
@@ -93,8 +95,7 @@ static void pass_on_log(struct remote *r)
     while (atomic_load(&c->read) != atomic_load(&c->logged)) {
         struct log_line *line = &c->lines[atomic_load(&c->read) % LOG_LINES];
         line->category[sizeof line->category - 1] = line->text[sizeof line->text - 1] = '\0';
-        if (r->log != NULL)
-            r->log(r, line->status, line->category, line->text);
+        pass_on(r, line->status, line->category, line->text);
         atomic_fetch_add(&c->read, 1);
     }
 }
@@ -137,14 +138,14 @@ EXPORT int caller_await(struct remote *r)
     return answered(r) ? r->channel->calls[0].status : STATUS_FATAL;
 }
 
-/* Return the reason why it could not. */
+/* Return the reason for its failure. */
 EXPORT const char *caller_reason(struct remote *r)
 {
     r->channel->data[r->capacity - 1] = '\0';
     return (const char *)r->channel->data;
 }
 
-/* Ask the host to end, without waiting for it; return whether it can hear that. */
+/* Ask the host to end, without waiting for it; return false if it has ended or does not respond. */
 EXPORT bool caller_stop(struct remote *r)
 {
     if (r->ended)
@@ -200,7 +201,7 @@ static struct slot packed(unsigned char *data, size_t used, const struct argumen
     return (struct slot){a->kind, (uint32_t)a->n, used};
 }
 
-/* Copy back a block that came out; strings and binary data stay in the channel until the next call. */
+/* Copy an output block back; strings and binary data stay in the channel until the next call. */
 static void unpack(const struct remote *r, const struct argument *a, const struct slot *s, bool failed)
 {
     unsigned char *data = r->channel->data;
@@ -341,17 +342,14 @@ struct remote *caller_at(struct remote *r, double begin, double end)
     return r;
 }
 
-struct remote *caller_begin(caller_log *log, void *environment, void *function)
+struct remote *caller_begin(caller_log *log, void *environment, void *logger)
 {
     struct remote *r = next;
     next = NULL;
     if (r != NULL) {
         r->log = log;
         r->environment = environment;
-        r->log_function = function;
+        r->logger = logger;
     }
     return r;
 }
-
-void *caller_environment(struct remote *r) { return r->environment; }
-void *caller_log_function(struct remote *r) { return r->log_function; }

@@ -1,12 +1,11 @@
-/* Waiting for the other process: spin on the word, because the answer mostly comes at once, then sleep.
+/* Waiting for the other process: spin on the word, because the answer usually comes at once, then sleep.
 
-   Sleeping lets the other process run where all cores are busy, and spinning keeps it from running;
-   but where a core is free, being woken costs more than everything else. So a long spin that timed
-   out shortens the next ones, until a short one sees the answer come: then the other process runs on
-   a core of its own. A long spin is tried again now and then, because a core may have become free:
-   soon at first, and ever more rarely while it times out. Linux wakes the sleeper through a futex.
-   Other systems offer no such call between processes; there the sleeper looks again after growing
-   pauses. */
+   Where all cores are busy, sleeping lets the other process run and spinning keeps it from running.
+   Where a core is free, waking up costs more than everything else. So a long spin that timed
+   out shortens the next ones, until a short one sees the answer: then the other process has a core of
+   its own. Long spins are repeated, because a core may have become free: soon at first, and less and
+   less often while they time out. Linux wakes the sleeper through a futex. Other systems have no such
+   call between processes; there the sleeper looks again after growing pauses. */
 
 #if defined __linux__
 #define _GNU_SOURCE /* syscall */

@@ -26,18 +26,18 @@ enum {
     MAX_CALLS = 16,
     LOG_LINES = 64,
     LOG_TEXT = 2048,
-    STATUS_WARNING = 1, /* these four of FMI 2.0 and 3.0 alike */
+    STATUS_WARNING = 1, /* this and the next two are the same in FMI 2.0 and 3.0 */
     STATUS_ERROR = 3,
     STATUS_FATAL = 4,
-    STATUS_PENDING = 5, /* of FMI 2.0 */
+    STATUS_PENDING = 5, /* FMI 2.0 only */
 };
 
 enum kind {
-    WORD,      /* a number by value, the bits of a double too */
+    WORD,      /* a number by value, or the bits of a double */
     BLOCK,     /* the place of values in data; 0 is NULL */
-    POINTERS,  /* the place of n such places: strings or binary data that go in */
-    TEXTS_OUT, /* the place of n places that the host writes: strings that come out */
-    BLOBS_OUT, /* the same for binary data, whose sizes are the argument before */
+    POINTERS,  /* the place of n places: strings or binary data as inputs */
+    TEXTS_OUT, /* the place of n places that the host writes: strings as outputs */
+    BLOBS_OUT, /* the same for binary data; the argument before has their sizes */
 };
 
 struct slot {
@@ -55,7 +55,7 @@ struct log_line {
     char category[60], text[LOG_TEXT];
 };
 
-/* How one side waits for the other. */
+/* The state of one side's waiting for the other. */
 struct waiting {
     _Atomic uint32_t sleeps;
     uint32_t until_long, interval; /* short spins until the next long one, and their number at first */
@@ -63,12 +63,12 @@ struct waiting {
 };
 
 struct channel {
-    _Alignas(64) _Atomic uint32_t request; /* number of the last one */
+    _Alignas(64) _Atomic uint32_t request; /* number of the last request */
     int32_t n;                             /* calls in it */
     uint64_t used;                         /* bytes of data */
     struct call calls[MAX_CALLS];
     _Alignas(64) _Atomic uint32_t answer;
-    _Atomic int32_t done; /* calls that were made, a failed one and the present one included */
+    _Atomic int32_t done; /* number of calls made, a failed and the present one included */
     _Alignas(64) struct waiting caller, host;
     _Alignas(64) _Atomic uint32_t logged, read; /* number of lines written, and of lines read */
     struct log_line lines[LOG_LINES];
@@ -84,7 +84,7 @@ const char *function_name(int function);
 /* Write the number of a request or answer, and wake the other side if it sleeps. */
 void channel_post(_Atomic uint32_t *word, uint32_t number, struct waiting *other);
 
-/* Wake the side that sleeps at the word, although its number has not come. */
+/* Wake the side that sleeps at the word before its number has come. */
 void channel_wake(_Atomic uint32_t *word);
 
 /* Wait until the word is `number`, for a twentieth of a second at most; return whether it is. */

@@ -66,8 +66,8 @@ static void resolve(const struct call *call, uint64_t a[])
     }
 }
 
-/* Copy the strings or binary data that an argument points to into data, behind all arguments; return
-   whether there was room. */
+/* Copy the strings or binary data of an argument into data, behind all arguments; return false if they
+   do not fit. */
 static bool bring_out(const struct slot *s, uint64_t *places, const size_t *sizes)
 {
     for (uint32_t j = 0; places != NULL && j < s->n; j++) {
@@ -139,7 +139,7 @@ static int make(const struct call *call, void *f)
     return status;
 }
 
-/* Report that the FMU is loaded, or the reason why it is not. */
+/* Report that the FMU is loaded, or the reason for its failure to load. */
 EXPORT void host_ready(void *memory, size_t bytes, const char *failure)
 {
     channel = memory;
@@ -150,8 +150,8 @@ EXPORT void host_ready(void *memory, size_t bytes, const char *failure)
     channel_post(&channel->answer, 1, &channel->caller);
 }
 
-/* Make calls until a request has none, which is the end. `functions` are the FMU's, in the order of
-   functions.h; NULL where the FMU has none. */
+/* Make calls until a request is empty. `functions` are the FMU's functions in the order of functions.h;
+   NULL stands for a function that the FMU does not have. */
 EXPORT void host_serve(void *const functions[])
 {
     for (uint32_t number = 2;; number++) {

@@ -1,4 +1,4 @@
-/* The functions of FMI that make and free the instance of an isolated FMU, or that it does not have.
+/* The functions of FMI that make and free the instance of an isolated FMU, and the unsupported ones.
    All others are generated from the table in functions.py. */
 
 #include "caller.h"
@@ -14,18 +14,14 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
-static void pass_on_2(struct remote *r, int status, const char *category, const char *text)
+static void log_2(void *logger, void *environment, int status, const char *category, const char *text)
 {
-    const fmi2CallbackLogger logger = (fmi2CallbackLogger)caller_log_function(r);
-    if (logger != NULL)
-        logger(caller_environment(r), "", (fmi2Status)status, category, "%s", text);
+    ((fmi2CallbackLogger)logger)(environment, "", (fmi2Status)status, category, "%s", text);
 }
 
-static void pass_on_3(struct remote *r, int status, const char *category, const char *text)
+static void log_3(void *logger, void *environment, int status, const char *category, const char *text)
 {
-    const fmi3LogMessageCallback log = (fmi3LogMessageCallback)caller_log_function(r);
-    if (log != NULL)
-        log(caller_environment(r), (fmi3Status)status, category, text);
+    ((fmi3LogMessageCallback)logger)(environment, (fmi3Status)status, category, text);
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
@@ -33,7 +29,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 {
     if (functions == NULL)
         return NULL;
-    struct remote *r = caller_begin(pass_on_2, functions->componentEnvironment, (void *)functions->logger);
+    struct remote *r = caller_begin(log_2, functions->componentEnvironment, (void *)functions->logger);
     return CALL(r, fmi2Instantiate, TEXT(name), NUMBER(type), TEXT(guid), TEXT(resources), NUMBER(visible),
                 NUMBER(logging)) == 0 ? r : NULL;
 }
@@ -42,7 +38,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3Boolean visible, fmi3Boolean logging,
                                           fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {
-    struct remote *r = caller_begin(pass_on_3, environment, (void *)log);
+    struct remote *r = caller_begin(log_3, environment, (void *)log);
     return CALL(r, fmi3InstantiateModelExchange, TEXT(name), TEXT(token), TEXT(resources), NUMBER(visible),
                 NUMBER(logging)) == 0 ? r : NULL;
 }
@@ -53,7 +49,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update)
 {
-    struct remote *r = caller_begin(pass_on_3, environment, (void *)log);
+    struct remote *r = caller_begin(log_3, environment, (void *)log);
     if (update != NULL) {
         caller_say(r, "an isolated FMU cannot call back for intermediate updates");
         return NULL;
@@ -70,7 +66,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
                                                fmi3UnlockPreemptionCallback unlock)
 {
     (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)update, (void)lock, (void)unlock;
-    caller_say(caller_begin(pass_on_3, environment, (void *)log), NO_SCHEDULED_EXECUTION);
+    caller_say(caller_begin(log_3, environment, (void *)log), NO_SCHEDULED_EXECUTION);
     return NULL;
 }
 

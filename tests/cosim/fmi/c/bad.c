@@ -23,8 +23,8 @@ struct model {
 };
 #define P struct model *p
 
-static char *volatile lost; /* so that the compiler keeps what is allocated */
-static double shared; /* what the fault "shared" keeps for all instances */
+static char *volatile lost; /* so that the compiler keeps the allocation */
+static double shared; /* the state that all instances share with the fault "shared" */
 
 EXPORT void *fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                              const fmi2CallbackFunctions *f, fmi2Boolean visible, fmi2Boolean logging) {

@@ -94,7 +94,7 @@ EXPORT fmi2Status fmi2SetReal(P, const unsigned vr[], size_t n, const double val
     return fmi2OK;
 }
 
-/* A string that comes out: the last one that was set, twice. */
+/* The output string is the last one set, twice. */
 EXPORT fmi2Status fmi2SetString(P, const unsigned vr[], size_t n, const fmi2String value[]) {
     snprintf(p->said, sizeof p->said, "%s%s", value[0], value[n - 1]);
     return fmi2OK;

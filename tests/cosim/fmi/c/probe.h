@@ -3,7 +3,7 @@
      r_out = 2 r_in; every other NAME_out = NAME_in + 1, b_out = not b_in, e_out = e_in
      v_out[i] = 2 v_in[n + 1 - i]
      text_out = text_in
-     label_length, blob_sum: what the string and the binary parameter came to
+     label_length, blob_sum: the length of the string parameter, the sum of the bytes of the binary one
      x' = 1; a state event takes 1 from x when 1 - x <= 0:           x(t) = t mod 1
      stair counts time events at 0.75, 1.5, ...                       floor(t / 0.75)
      quarters counts step events, one at every fourth completed step

@@ -1,4 +1,4 @@
-"""Archives and model descriptions that must be refused, one test a class; and extraction, which is shared."""
+"""Archives and model descriptions that must be refused, one test per class; and shared extraction."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ VERSIONS = ["2.0", "3.0"]
 
 
 def write(path: Path, *, text: str | bytes | None = None, more=(), compression=zipfile.ZIP_STORED) -> Path:
-    """An FMU 2.0 with another model description or more entries: name or ZipInfo, and content."""
+    """Write an FMU 2.0 with another model description or more entries: name or ZipInfo, and content."""
     entries = [("modelDescription.xml", description2(False) if text is None else text), (LIBRARY, b"text")]
     with warnings.catch_warnings(), zipfile.ZipFile(path, "w", compression) as written:
-        warnings.simplefilter("ignore")  # zipfile warns of names that are there twice
+        warnings.simplefilter("ignore")  # zipfile warns of duplicate names
         for name, content in [*entries, *more]:
             written.writestr(name, content)
     return path
@@ -51,7 +51,7 @@ def refused(path: Path, words: str) -> None:
 
 @pytest.fixture
 def tmp(tmp_path, monkeypatch):
-    """The folder that FMUs are unpacked in; empty at the end, with nothing beside it."""
+    """The folder in which FMUs are unpacked; at the end it is empty and the only one in its parent."""
     place = tmp_path / "outer" / "place"
     place.mkdir(parents=True)
     monkeypatch.setattr(archive.tempfile, "tempdir", str(place))
@@ -86,7 +86,7 @@ def test_a_path_out_of_the_folder(tmp_path, tmp, name, words):
 
 @pytest.mark.parametrize("name", ["", "a\0b"])
 def test_a_path_that_zipfile_does_not_write(tmp_path, tmp, name):
-    """zipfile writes no such name, and reads it as another one: patched in, of equal length."""
+    """zipfile does not write such a name, so another name of the same length is patched."""
     content = write(tmp_path / "name.fmu", more=[("a!b", b"x")]).read_bytes()
     if name:
         content = content.replace(b"a!b", name.encode())
@@ -109,7 +109,7 @@ def test_a_file_that_is_there_twice(tmp_path, tmp):
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_compression_that_fmi_does_not_have(tmp_path, tmp, method):
-    """zipfile unpacks these in one piece, of whatever size: a thousandfold bomb in memory."""
+    """zipfile unpacks these in one piece of any size, which would be a thousandfold bomb in memory."""
     path = write(tmp_path / "method.fmu", compression=method)
     refused(path, f"compression method {method}; FMI has deflate")
 
@@ -126,7 +126,7 @@ def test_an_encrypted_archive(tmp_path, tmp):
 
 
 def test_an_archive_that_is_cut_off(tmp_path, tmp):
-    """At every part: none is taken, and none raises anything else."""
+    """Wherever it is cut off, it is refused with an FMUError."""
     content = write(tmp_path / "whole.fmu").read_bytes()
     path = tmp_path / "cut.fmu"
     for length in [*range(0, len(content), 97), *range(len(content) - 30, len(content))]:
@@ -144,7 +144,7 @@ def test_a_damaged_file_in_the_archive(tmp_path, tmp):
 
 
 def declare(path: Path, name: str, size: int) -> None:
-    """Write another unpacked size of an entry to the directory and to its header."""
+    """Change the declared unpacked size of an entry, in the directory and in its header."""
     content = bytearray(path.read_bytes())
     for head, at_size, at_name in ((b"PK\x03\x04", 22, 30), (b"PK\x01\x02", 24, 46)):
         at = next(
@@ -165,14 +165,14 @@ def test_a_bomb_by_ratio(tmp_path, tmp, monkeypatch):
 
 
 def test_a_bomb_that_declares_little(tmp_path, tmp):
-    """1 MB that says 10 bytes: no more than that is written, and the checksum tells."""
+    """1 MB is declared as 10 bytes: only 10 are written, and the checksum reveals it."""
     path = write(tmp_path / "liar.fmu", more=[("zeros", bytes(2**20))], compression=zipfile.ZIP_DEFLATED)
     declare(path, "zeros", 10)
     refused(path, "'zeros' cannot be unpacked: Bad CRC-32")
 
 
 def test_a_model_description_that_declares_little(tmp_path, tmp):
-    """256 MB of blanks in 260 KB, declared as 100 bytes, are not inflated to find that out."""
+    """256 MB of blanks in 260 kB, declared as 100 bytes, are refused without being inflated."""
     path = write(tmp_path / "bomb.fmu", text=b" " * (256 << 20), compression=zipfile.ZIP_DEFLATED)
     declare(path, "modelDescription.xml", 100)
     tracemalloc.start()
@@ -184,7 +184,7 @@ def test_a_model_description_that_declares_little(tmp_path, tmp):
 
 
 def test_a_bomb_of_overlapping_files(tmp_path, tmp):
-    """Thousands of entries that all are one and the same 1 MB: 7 GB from 600 kB."""
+    """Thousands of entries share the same 1 MB: 7 GB from 600 kB."""
     path = write(tmp_path / "overlap.fmu", more=[("zeros", bytes(2**20))], compression=zipfile.ZIP_DEFLATED)
     content = path.read_bytes()
     end = content.rfind(b"PK\x05\x06")
@@ -220,7 +220,7 @@ def test_a_disk_that_is_too_small(tmp_path, tmp, monkeypatch):
 
 
 def test_an_fmu_with_large_resources_passes(tmp_path, tmp, monkeypatch):
-    """A table packed five to one, above the size from which ratios count: real FMUs have that."""
+    """A table packed five to one, above the size from which ratios count, as in real FMUs."""
     monkeypatch.setattr(archive, "HARMLESS", 2**23)
     block = np.random.default_rng(1).integers(0, 256, 2**18, dtype=np.uint8).tobytes() + bytes(2**20 - 2**18)
     path = write(
@@ -289,8 +289,8 @@ def test_value_references_of_fmi3_are_unique(tmp_path):
     refused(write(tmp_path / "twice.fmu", text=text), 'has the same value reference as variable "r_in"')
 
 
-def test_an_array_of_a_size_that_no_machine_has(tmp_path):
-    """A dimension of 10^12; and as start value of the structural parameter that gives it."""
+def test_an_array_that_exceeds_any_memory(tmp_path):
+    """A dimension of 10^12, in the description and as start value of the structural parameter."""
     text = description3(False).replace(
         '<Dimension valueReference="40"/>', '<Dimension start="1000000000000"/>'
     )
@@ -308,7 +308,7 @@ def test_an_array_of_a_size_that_no_machine_has(tmp_path):
 
 
 def test_white_space_in_lists_is_free(tmp_path):
-    """As XML has it: FMPy takes single blanks only."""
+    """XML allows any white space, FMPy single blanks only."""
     text = description2(False).replace('dependencies="1"', 'dependencies=" 1&#9;  3 "')
     fmu = FMU(write(tmp_path / "white.fmu", text=text))
     assert fmu.feedthrough()["r_out"] == {"r_in", "i_in"}
@@ -327,7 +327,7 @@ def test_white_space_in_lists_is_free(tmp_path):
     ],
 )
 def test_names_that_look_like_elements(tmp_path, names, expected):
-    """Elements of one array are joined; names of other ranks, twice the same, or of no array are not."""
+    """Only the elements of one whole array are joined, not names of several ranks or duplicate indices."""
     text = description2(False)
     for old, new in zip(["x", "der(x)"], names, strict=True):
         text = text.replace(f'name="{old}"', f'name="{new}"')
@@ -358,7 +358,7 @@ def test_a_binary_that_is_no_library(tmp_path, version):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_guid_that_is_not_that_of_the_binary(tmp_path, version):
-    """The FMU gives no instance, and its own words say why."""
+    """The FMU refuses the instance, and the error has the reason from its log."""
     attribute = b"guid" if version == "2.0" else b"instantiationToken"
     pattern, other = attribute + b'="[^"]*"', attribute + b'="{another}"'
     path = changed(
@@ -401,7 +401,7 @@ def test_fmus_of_one_file_share_a_folder_while_there_is_one(tmp_path, tmp):
 
 
 def test_a_file_that_changes_is_another_fmu(tmp_path, tmp):
-    """Of the same size, and of the same time of change as a clock of seconds gives it."""
+    """The file has the same size and, in whole seconds, the same time of change."""
     path = write(tmp_path / "plant.fmu", more=[("resources/x", b"1")])
     first, times = FMU(path), path.stat()
     write(path, more=[("resources/x", b"2")])
@@ -427,7 +427,7 @@ def test_a_forked_process_leaves_the_folder(tmp_path, tmp):
     fmu = FMU(write(tmp_path / "plant.fmu"))
     folder = fmu.directory
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of forking beside threads
+        warnings.simplefilter("ignore", DeprecationWarning)  # forking with several threads
         child = os.fork()
     if child == 0:
         del fmu

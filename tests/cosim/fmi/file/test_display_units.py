@@ -125,7 +125,7 @@ def test_any_number_is_read(number, unit):
     units = [
         SimpleNamespace(name="rad", baseUnit=None, displayUnits=[DisplayUnit("deg", factor=180.0 / math.pi)])
     ]
-    port = FMUPort("x", (), "rad", "Float64", (SimpleNamespace(relativeQuantity=None, declaredType=None),))
+    port = FMUPort("", "x", (), "rad", type="Float64")
     factor = {"deg": math.pi / 180.0, "rad": 1.0, "mrad": 1e-3}[unit.strip()]
     read = without_units("f", port, units, f"{number!r}{unit}")
     assert read == pytest.approx(number * factor, rel=1e-14)

@@ -1,7 +1,7 @@
 """Any file named .fmu gives an FMU or an FMUError: nothing else is raised, nothing is written elsewhere.
 
-Files of ours and of c/probe.h, changed at random: as bytes, as an archive, as XML. The
-binaries in them are a few bytes of text, for nothing is loaded here.
+Exported FMUs and those of c/probe.h are changed at random: as bytes, as archives, as XML. Their
+binaries are a few bytes of text, because nothing is loaded here.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def packed(entries: list[tuple[str, bytes]], compression: int = zipfile.ZIP_DEFL
 
 @pytest.fixture(scope="module")
 def outer(tmp_path_factory):
-    """A folder whose innermost folder is where FMUs are unpacked to; nothing else may appear in it."""
+    """A folder in whose innermost folder FMUs are unpacked; nothing else may appear in it."""
     folder = tmp_path_factory.mktemp("outer")
     (folder / "a" / "b").mkdir(parents=True)
     with pytest.MonkeyPatch.context() as patch:
@@ -80,7 +80,7 @@ def outer(tmp_path_factory):
 
 
 def taken(outer: Path, content: bytes) -> bool:
-    """Tell whether a file is an FMU; it is one, or an FMUError says why not."""
+    """Return whether a file is an FMU; otherwise an FMUError must give the reason."""
     path = outer / "fuzzed.fmu"
     path.write_bytes(content)
     message = ""
@@ -118,7 +118,7 @@ def test_the_originals_are_fmus(outer):
 @fuzzed
 @given(st.data())
 def test_changed_bytes(outer, data):
-    """Cut off, flipped, copied over each other, padded; stored archives let flips reach the XML."""
+    """Bytes are cut off, flipped, overwritten, inserted; in stored archives, flips reach the XML."""
     original = data.draw(st.sampled_from(originals()))
     compression = data.draw(st.sampled_from([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED]))
     content = bytearray(packed(list(original.items()), compression))
@@ -152,7 +152,7 @@ NAMES = st.sampled_from(
 @fuzzed
 @given(st.data())
 def test_changed_archives(outer, data):
-    """Entries left out, added, twice, under names that lead elsewhere, with other headers."""
+    """Entries are omitted, added, duplicated, renamed to paths that lead elsewhere; headers are changed."""
     entries = list(data.draw(st.sampled_from(originals())).items())
     for _ in range(data.draw(st.integers(0, 3))):
         i = data.draw(st.integers(0, len(entries) - 1))
@@ -197,7 +197,7 @@ TAGS = """Real Float64 UInt64 Clock Binary String Dimension Alias Start Unknown 
 @fuzzed
 @given(st.data())
 def test_changed_elements(outer, data):
-    """Attributes and elements dropped, duplicated, huge, nested, renamed, elsewhere."""
+    """Attributes and elements are dropped, duplicated, enlarged, nested, renamed and moved."""
     original = dict(data.draw(st.sampled_from(originals())))
     root = etree.fromstring(original["modelDescription.xml"])
     for _ in range(data.draw(st.integers(1, 4))):
@@ -243,7 +243,7 @@ PARTS = st.sampled_from(
 @fuzzed
 @given(st.data())
 def test_changed_text(outer, data):
-    """What no XML writer writes: entities, declarations, cut elements, other encodings."""
+    """Text that XML writers do not produce: entities, declarations, cut elements, other encodings."""
     original = dict(data.draw(st.sampled_from(originals())))
     text = original["modelDescription.xml"].decode()
     places = [0, len(text), *(i for i, c in enumerate(text) if c in '<>" ')]

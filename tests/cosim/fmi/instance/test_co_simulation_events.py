@@ -29,7 +29,7 @@ def test_the_fmu_is_valid(path, tmp_path):
 @pytest.mark.parametrize("early_return", [True, False])
 @pytest.mark.parametrize("event_mode", [True, False, None])
 def test_events_inside_steps(tmp_path, early_return, event_mode):
-    """x = t mod 1, however its events are handled: in the step, at their instant, at the end of the step."""
+    """x = t mod 1 for every handling of events: in the step, at their instants, at the end of the step."""
     path = metronome(tmp_path / "m.fmu", early_return=early_return)
     fmu = FMU(path, interface=CoSimulation(event_mode))
     result = simulate(System({"m": fmu}), step=H, stop=32 * H)
@@ -69,7 +69,7 @@ def test_discrete_inputs_are_set_when_they_change(path, event_mode, as_block):
 
 
 def test_a_step_over_several_events(path, tmp_path):
-    """Four periods of x in a step: every event by itself, or all of them at its end."""
+    """With four periods of x in a step, the events are handled one by one, or together at its end."""
     for early_return in (True, False):
         fmu = FMU(
             metronome(tmp_path / "m.fmu", early_return=early_return),
@@ -84,7 +84,7 @@ def test_a_step_over_several_events(path, tmp_path):
         assert list(result["m.entries"]) == list(entries)
 
 
-def test_steps_that_are_no_binary_fraction(path):
+def test_steps_that_are_not_binary_fractions(path):
     """Time events at 0.9 j fall on the points t_3j = 0.3 k to rounding, before or after: each is met."""
     fmu = FMU(path, interface=CoSimulation(event_mode=True), start={"beat": 0.9, "rate": 1e-9})
     result = simulate(System({"m": fmu}), step=0.3, stop=300.0)
@@ -93,7 +93,7 @@ def test_steps_that_are_no_binary_fraction(path):
     assert list(result["m.beats"]) == list(k // 3)
 
 
-def test_a_step_that_does_not_get_on(path):
+def test_a_step_without_progress(path):
     for event_mode in (True, False):
         fmu = FMU(path, interface=CoSimulation(event_mode), start={"stuck": 1.0})
         words = r"m failed .*: m returns early from its step at t = 1 s without making progress"
@@ -102,7 +102,7 @@ def test_a_step_that_does_not_get_on(path):
         assert list(caught.value.result.time) == [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
-def test_event_mode_has_to_be_there(tmp_path):
+def test_event_mode_must_be_available(tmp_path):
     path = metronome(tmp_path / "m.fmu", event_mode=False)
     with pytest.raises(
         FMUError, match=r"m\.fmu has no event mode in Co-Simulation, which event_mode=True requires"

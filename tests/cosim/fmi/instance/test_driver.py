@@ -1,4 +1,4 @@
-"""The driver of an FMU by itself: failures of calls, in this process and in a process of its own."""
+"""The driver of an FMU alone: failures of calls, in this process and in an isolated one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cosim import FMU, FMUError, SimulationError
 from cosim.fmi.instance.continuous_time import ContinuousTime
 from cosim.fmi.instance.drivers import load
 from cosim.loop.signals import RunSignals
-from tests.cosim.fmi.isolation.test_isolation import crash
+from tests.cosim.fmi.crash import crash
 from tests.cosim.fmi.probe import probe
 
 
@@ -61,7 +61,7 @@ def test_a_negative_status_in_continuous_time_is_a_failure(driver):
 
 
 def test_a_failure_without_a_text_names_its_type(driver):
-    """As those of FMPy for a state whose size is too large for the memory."""
+    """FMPy raises such an exception for a state that is larger than the memory."""
 
     def fail():
         raise MemoryError

@@ -11,7 +11,7 @@ from fmus.export import export
 
 
 class Drift(LinearContinuous):
-    """w' = 1, x_i' = u_i: whatever is put in adds up; the output is another one."""
+    """w' = 1, x_i' = u_i: the inputs are summed in x; the output is w."""
 
     u = Input(shape=3)
     w = State(0.0)
@@ -30,7 +30,7 @@ class Drift(LinearContinuous):
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 @pytest.mark.parametrize("coupling", ["sampled", "continuous"])
 def test_the_state_is_named(tmp_path: Path, version: str, coupling: str) -> None:
-    """x[2] = 2 + 1e308 t passes the largest double, 1.8e308, in the step from t = 1 s; no other does."""
+    """x[2] = 2 + 1e308 t exceeds the largest double, 1.8e308, in the step from t = 1 s, as the only state."""
     path = export(Drift(), tmp_path / "drift.fmu", fmi_version=version, interfaces=["ModelExchange"])
     plant = FMU(path, start={"u": [0.0, 1e308, 0.0]})
     options = {"coupling": coupling} | ({"solver": "ode1"} if coupling == "continuous" else {})

@@ -48,7 +48,7 @@ class Pole(Continuous):
 
 
 class Stiff(Continuous):
-    """y' = -L (y - u), z' = -z: a fast lag beside a slow decay"""
+    """y' = -L (y - u), z' = -z: a fast lag and a slow decay"""
 
     L = Parameter(1e5)
     u = Input()
@@ -107,10 +107,10 @@ class VanDerPol(Continuous):
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
 def test_cvode_keeps_its_tolerance_over_many_restarts(plants, tolerance):
-    """500 communication points, at each of which it starts anew at order one.
+    """CVODE restarts at order one at each of 500 communication points.
 
-    30 times what is asked for: errors grow on the steep parts of the cycle. Controlled to
-    `tolerance` itself, the internal steps would leave 2e-3 at 1e-6.
+    The bound is 30 times the tolerance, because errors grow on the steep parts of the cycle. Internal
+    steps controlled to `tolerance` itself would leave an error of 2e-3 at 1e-6.
     """
     fmu = exchanged(plants[VanDerPol], solver="cvode", tolerance=tolerance)
     result = simulate(System({"p": fmu}), step=0.02, stop=10.0)
@@ -136,15 +136,15 @@ def test_a_stiff_plant_with_held_inputs(plants):
         simulate(system, step=0.01, stop=0.5)
 
 
-def test_a_long_step_is_no_failure_of_the_solver(plants):
-    """A single communication step that takes CVODE more than the 500 internal steps it stops at by itself."""
+def test_a_long_step_is_not_a_failure_of_the_solver(plants):
+    """A communication step may take more than the 500 internal steps at which CVODE stops by default."""
     fmu = exchanged(plants[Pole], solver="cvode", tolerance=1e-10)
     result = simulate(System({"p": fmu}), step=0.999, stop=0.999)
     assert result["p.y"][-1] == pytest.approx(1000.0, rel=1e-6)  # errors grow by y^2
 
 
 def test_a_run_can_be_repeated(path):
-    """CVODE starts anew at every communication point: the same bits, whatever was computed before."""
+    """CVODE restarts at every communication point, so earlier runs do not change a bit."""
     runs = [simulate(System({"b": FMU(path)}), step=0.1, stop=1.0 * n)["b.h"] for n in (4, 4, 2)]
     assert list(runs[0]) == list(runs[1])
     assert list(runs[0][:21]) == list(runs[2])
@@ -152,7 +152,7 @@ def test_a_run_can_be_repeated(path):
 
 @pytest.mark.parametrize("solver", ["ode2", "cvode"])
 def test_a_run_can_be_rolled_back(path, solver):
-    """Before a bounce and a time event, and over them again, twice: the same bits."""
+    """A run over a bounce and a time event is repeated twice with the same bits."""
     fmu = exchanged(path, solver=solver, start={"first_at": 1.37})
     with Simulation(System({"b": fmu}), step=0.1) as simulation:
         simulation.run(1.3)
@@ -174,7 +174,7 @@ def test_the_fmu_of_these_tests_is_valid(path):
 
 
 def test_a_bouncing_ball_against_its_closed_form(path):
-    """Seven bounces, then rest. A bounce at the end of the step would be 0.03 s late, h off by as much."""
+    """Seven bounces, then rest. A bounce at the end of a step would make h wrong by up to 0.03."""
     result = simulate(System({"b": FMU(path)}), step=0.03, stop=6.0)
     wanted = [height(t) for t in result.time]
     assert result["b.h"] == pytest.approx(wanted, abs=2e-6)
@@ -190,7 +190,7 @@ def test_a_bouncing_ball_against_its_closed_form(path):
 @pytest.mark.parametrize("solver", [*FIXED, "cvode"])
 @pytest.mark.parametrize(("first", "period"), [(0.37, 0.25), (0.05, 0.01), (0.3, 0.1)])
 def test_time_events_are_met_exactly(path, solver, first, period):
-    """q' = 1, -1, 1, ...: every method is exact between the events, and off by h if it runs over one."""
+    """q' = 1, -1, 1, ...: every method is exact between events, and wrong by h if it passes over one."""
     fmu = exchanged(path, solver=solver, start={"first_at": first, "period": period, "g": 0.0})
     result = simulate(System({"b": fmu}), step=0.1, stop=2.0)
     events = first + period * np.arange(1000)
@@ -210,7 +210,7 @@ def test_time_events_are_met_exactly(path, solver, first, period):
     ],
 )
 def test_time_events_of_an_fmu_without_states(tmp_path, solver, coupling, step):
-    """The FMU refuses an event that is off by a rounding, and every function of states, of which it has none.
+    """The FMU refuses an event that is wrong by rounding, and all functions of states, as it has no states.
 
     Its events are at sums of 0.1, the communication points at products: they differ from k = 6 on.
     """
@@ -239,7 +239,7 @@ def test_an_input_that_jumps_over_an_indicator_is_an_event_at_once(path):
     ],
 )
 def test_a_request_to_end_in_an_event(path, solver, coupling, last, when):
-    """A bounce at sqrt(2) s: cvode leaves the step there, fixed steps find it at the end of theirs."""
+    """A bounce at sqrt(2) s: cvode leaves the step there, fixed-step methods find it at the end of theirs."""
     fmu = exchanged(path, start={"end_at_bounce": 1}, solver=solver)
     with pytest.warns(SimulationEndedWarning, match=rf"b asked to end the simulation at t = {when} s"):
         result = simulate(System({"b": fmu}), step=0.25, stop=5.0, coupling=coupling)
@@ -249,14 +249,14 @@ def test_a_request_to_end_in_an_event(path, solver, coupling, last, when):
         simulate(System({"b": fmu}), step=0.25, stop=5.0)
 
 
-def test_stage_coupling_says_that_it_runs_over_a_time_event(path):
+def test_stage_coupling_warns_of_a_time_event_inside_a_step(path):
     fmu = FMU(path, start={"first_at": 0.25, "g": 0.0})
     words = r"b has a time event at t = 0\.25 s, inside the step to t = 0\.3 s"
     with pytest.warns(LateEventWarning, match=words):
         simulate(System({"b": fmu}), step=0.1, stop=0.5, coupling="continuous")
 
 
-def test_what_the_schedule_says(path):
+def test_the_text_of_the_schedule(path):
     cvode = "  b: cvode, tolerance 1e-06, from event to event (FMU, Python callback)"
     assert cvode in schedule(System({"b": FMU(path)}), step=0.1).splitlines()
     fixed = "  b: ode2, 3 substeps, split at time events (FMU)"
@@ -275,7 +275,7 @@ def test_an_fmu_that_fails_in_a_step(path, solver):
 
 
 def test_derivatives_that_are_discarded(path):
-    """cvode tries smaller steps; there is no bounce above the hole, so it fails."""
+    """cvode tries smaller steps, and fails because the ball does not bounce above the hole."""
     start = {"hole": -0.5}
     with pytest.raises(SimulationError, match=r"b does not get past t = 0\.9999\d* s"):
         simulate(System({"b": FMU(path, start=start)}), step=0.1, stop=2.0)
@@ -300,8 +300,8 @@ def test_interfaces_that_an_fmu_does_not_support(path, plants):
         with pytest.raises(FMUError, match=words):
             FMU(where, **options)
     for options, words in [
-        ({"interface": "CoSimulation"}, "stage coupling needs Model Exchange; leave interface away"),
-        ({"interface": ModelExchange("ode4")}, "leave the options of ModelExchange away"),
+        ({"interface": "CoSimulation"}, "stage coupling needs Model Exchange; omit interface="),
+        ({"interface": ModelExchange("ode4")}, "omit the options of ModelExchange"),
     ]:
         with pytest.raises(WiringError, match=words):
             simulate(System({"p": FMU(both, **options)}), step=0.1, stop=0.1, coupling="continuous")

@@ -1,4 +1,4 @@
-"""The table of functions that an isolated FMU can be asked for."""
+"""The table of the functions that an isolated FMU supports."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from cosim.codegen.c_compiler import fmi_headers
 from cosim.fmi.isolation.functions import sources
 
-#: made by hand in instances.c, and never sent to the host
+#: written by hand in instances.c, and never sent to the host
 _ANSWERED_HERE = {
     "fmi2GetTypesPlatform",
     "fmi2GetVersion",
@@ -30,7 +30,7 @@ def test_every_function_of_the_headers_is_in_the_table(version):
 
 
 def test_a_row_becomes_both_ends_of_a_call():
-    """A step has a time, and a second name for the loop; arrays carry their lengths."""
+    """A step has a time, and a second name for the loop; arrays have their lengths."""
     text = sources()["functions.c"]
     assert (
         "EXPORT fmi2Status loop_fmi2DoStep(void *c, double t, double h, int no_set_before)\n"

@@ -226,7 +226,7 @@ def test_an_fmu_that_asks_to_end_while_the_start_is_iterated(tmp_path):
     system = System({"m": FMU(metronome(tmp_path / "m.fmu"), interface=CoSimulation(True)), "b": Backwards()})
     system.connect("m.x", "b.u")
     system.connect("b.y", "m.rate")
-    with pytest.raises(SimulationError, match=r"m asked to end .* at t = 0 s, which is its start"):
+    with pytest.raises(SimulationError, match=r"m asked to end .* at t = 0 s, at the start of the run"):
         simulate(system, step=0.25, stop=1.0, coupling="iterated")
 
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+from controllers.design.design_model import DesignModel, first_order
 from controllers.design.reduction import dominant_modes, static_condensation
 from controllers.design.riccati import DesignError, regulator
-from controllers.design.state_space import StateSpace, first_order
 from controllers.design.surface_design import optimal_surface
 from controllers.laws.continuous_sliding_mode import ContinuousSlidingMode
 from controllers.laws.equivalent_force import design as equivalent_force
@@ -25,7 +25,7 @@ def chain(n: int = 6) -> tuple[Array, Array, Array]:
     return np.diag(m), 0.002 * K + 0.01 * np.diag(m), K
 
 
-def reduced(n: int = 6) -> StateSpace:
+def reduced(n: int = 6) -> DesignModel:
     M, C, K = chain(n)
     force = np.zeros((n, 1))
     force[n - 1] = 1.0
@@ -225,7 +225,7 @@ def test_output_weights(rng: np.random.Generator) -> None:
     z = C @ x + D @ u
     assert x @ Q @ x + 2 * x @ N @ u + u @ R @ u == pytest.approx(z @ W @ z, rel=1e-12)
     assert StateFeedback.lqr(
-        StateSpace(-np.eye(4), np.eye(4)[:, :2], C, C, D, D), Q, R + np.eye(2), N
+        DesignModel(-np.eye(4), np.eye(4)[:, :2], C, C, D, D), Q, R + np.eye(2), N
     ).minus_K.shape == (2, 4)
 
 
@@ -247,7 +247,7 @@ def test_failing_conditions_name_the_culprit() -> None:
     with pytest.raises(DesignError, match="singular"):
         static_condensation(M, free, [2, 3])
     model = reduced()
-    blind = StateSpace(
+    blind = DesignModel(
         np.diag([0.1, -1.0]),
         np.ones((2, 1)),
         np.eye(2),
@@ -259,7 +259,7 @@ def test_failing_conditions_name_the_culprit() -> None:
         observer_gain(blind, np.eye(2), np.eye(1))
     with pytest.raises(DesignError, match=r"take one"):
         equivalent_force(
-            StateSpace(model.A, np.hstack([model.B, model.B]), model.E, model.C, model.D, model.F), np.eye(6)
+            DesignModel(model.A, np.hstack([model.B, model.B]), model.E, model.C, model.D, model.F), np.eye(6)
         )
 
 

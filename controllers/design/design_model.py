@@ -18,7 +18,7 @@ from cosim import Array
 
 
 @dataclass(frozen=True)
-class StateSpace:
+class DesignModel:
     """x' = A x + B u + E w;  y = C x + D u + F w + v"""
 
     A: Array  # (n, n)
