@@ -170,7 +170,7 @@ TABLE: dict[str, list[Row]] = {
             "get, set and serialise state: snapshot, restore, branch; an error names an FMU without states",
             "ours, probe",
             f"{STATES}::test_a_snapshot_is_returned_to_exactly_and_a_branch_goes_its_own_way",
-            f"{STATES}::test_participants_that_cannot_keep_their_state_are_named",
+            f"{STATES}::test_components_that_cannot_keep_their_state_are_named",
         ),
         both(
             "an FMU in the place of a block", "ours", f"{F3}::test_a_block_as_fmu_acts_where_the_block_acts"

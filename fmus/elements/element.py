@@ -1,8 +1,9 @@
 """An element: a force law, its parameters, and the displacements that deform it.
 
 A law gives the force at the end of a step as a function of the deformation there. It is
-written in the compilable subset and needs no registration: a structure compiles the laws of
-its own elements.
+compiled, so it may contain numbers, `if`, loops over ranges, abs, min, max, the functions of
+math, and functions of the same kind; it must not make an array (as np.interp does), a list,
+a dict or text. It needs no registration: a structure compiles the laws of its own elements.
 
 An element of one row has one deformation d = row . x and the law
 
@@ -26,8 +27,14 @@ An element of two rows e and e + 1 has two deformations and one law for both,
 which writes force[e], force[e + 1], tangent[e], tangent[e + 1] and
 coupling[e] = d force[e]/d d[e + 1].
 
-A step may be repeated or divided, so z is the only memory of a law. Two places of z are
-outputs of the structure; the places from OWN on belong to the law.
+A compiled law does not notice an index outside p or z. Interpreted, it raises an IndexError:
+in the tests of the law, in a run with jit=False, and when `NonlinearStructure.build` calls it
+once at rest (at_rest.py).
+
+`scale` is the smallest deformation at which the law changes, such as the first corner. A step
+may be repeated or divided, so z is the only memory of a law. Two places of z are outputs of
+the structure; the places from OWN on belong to the law. Leave `memory` at its default if the
+law keeps nothing.
 """
 
 from __future__ import annotations
@@ -57,8 +64,8 @@ class Element:
     law: Law  # force law of one or of two rows
     rows: Array  # (1, n) or (2, n): deformation for unit displacements
     parameters: tuple[float, ...]
-    k0: float  # initial tangent; the stiffness matrix of the structure contains it
-    scale: float  # typical deformation, against which convergence is measured
+    k0: float  # tangent at rest in a long step; the stiffness matrix of the structure contains it
+    scale: float  # smallest deformation at which the law changes; convergence is relative to it
     k0_coupling: float = 0.0  # initial tangent between the two rows
     memory: int = 1  # number of places from OWN on
 

@@ -25,6 +25,7 @@ import scipy.linalg as la
 
 from cosim import Continuous, Input, Local, Output, Parameter
 
+from ..elements.at_rest import check_at_rest
 from ..elements.element import OWN, Element, Law
 from ..kernels.newmark import advance, advance_with, measure, rebound
 from ..kernels.sparse_ldl import plan
@@ -246,6 +247,7 @@ def _check(structure: Structure, elements: Sequence[Element]) -> None:
                 f"{where}: element {i} has rows of {e.rows.shape[1]} entries, the structure has {n} "
                 "degrees of freedom; give each row one entry for each"
             )
+        check_at_rest(e, f"element {i}")
         tangent = np.array([[e.k0, e.k0_coupling], [e.k0_coupling, e.k0]])[: len(e.rows), : len(e.rows)]
         rest -= e.rows.T @ tangent @ e.rows
     lowest = la.eigvalsh(rest, subset_by_index=[0, 0])[0]

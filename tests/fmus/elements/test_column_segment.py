@@ -54,10 +54,12 @@ def test_segment_does_not_depend_on_how_a_straight_path_is_cut():
 
 
 def test_segment_tangents_are_those_of_two_parallel_components():
-    """One hinge: r k + (1 - r) (k11 - k12^2/k11) at the far end; both: r k."""
+    """No hinge: k; one: r k + (1 - r) (k11 - k12^2/k11) at the far end; both: r k."""
     k11, k12, r = 3.4e4, -2.3e4, 0.02
-    one = segment_path([(2e-3, 5e-4)])[2]
-    assert one == pytest.approx((r * k11, r * k12, r * k11 + (1 - r) * (k11 - k12**2 / k11)), rel=1e-12)
+    assert segment_path([(2e-4, -3e-4)])[2] == (k11, k12, k11)
+    far = r * k11 + (1 - r) * (k11 - k12**2 / k11)
+    assert segment_path([(2e-3, 5e-4)])[2] == pytest.approx((r * k11, r * k12, far), rel=1e-12)
+    assert segment_path([(5e-4, 2e-3)])[2] == pytest.approx((far, r * k12, r * k11), rel=1e-12)
     both = segment_path([(9e-3, -9e-3)])[2]
     assert both == pytest.approx((r * k11, r * k12, r * k11), rel=1e-12)
 
