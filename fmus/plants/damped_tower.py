@@ -27,7 +27,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -61,10 +60,6 @@ class DampedTower(Continuous):
 
     z_re = State(shape="r", meaning="complex modal coordinates, real part")
     z_im = State(shape="r", meaning="complex modal coordinates, imaginary part")
-
-    if TYPE_CHECKING:
-        der_z_re: Array
-        der_z_im: Array
 
     # sizes: n degrees of freedom, f of them with outputs, s = n + 1, q = f + 1, r = 2 n + 2 modes at most
     count = Local(0.0, "number of modes, one of each pair")

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,10 +40,6 @@ class ModalStructure(Continuous):
     a = Output("accelerations", shape="f", unit="m/s^2")
     eta = State(shape="n", meaning="modal coordinates")
     eta_dot = State(shape="n", meaning="their derivatives")
-
-    if TYPE_CHECKING:
-        der_eta: Array
-        der_eta_dot: Array
 
     g = Local(shape="n", meaning="phi' w")
     hold_step = Local(0.0, "step that hold belongs to", unit="s")

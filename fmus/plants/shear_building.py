@@ -40,9 +40,6 @@ class ShearBuilding(LinearContinuous):
     drift = Output("drift of each story", shape="n", unit="m")
     base_shear = Output("shear force in the columns of the first story", unit="N")
 
-    der_x: Array
-    der_v: Array
-
     def derivatives(self, t: float) -> None:
         n = self.x.shape[0]
         for i in range(n):
