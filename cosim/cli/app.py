@@ -20,7 +20,7 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 from ..errors import CosimError, SimulationEndedWarning
-from ..result import Interrupted, Result, SimulationError
+from ..result import Interrupted, SimulationError
 from ..system.system import System
 from .json_text import json_text
 from .load import find_participant, load_scenario
@@ -113,7 +113,7 @@ def _run_command(scenario: Scenario) -> Callable[..., None]:
         try:
             with warnings.catch_warnings(), _progress(study.run) as more:
                 warnings.simplefilter("ignore", SimulationEndedWarning)  # a line of the output says it
-                result: Result = study.run(**more)
+                result = scenario.run(study, **more)
         except (SimulationError, Interrupted) as error:
             if error.result is not None:
                 *_, kept = folder.save(scenario, study, options, error.result)

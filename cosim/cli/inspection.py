@@ -18,9 +18,10 @@ def inspection(path: Path) -> str:
     """Return capabilities, default experiment and variables of an FMU."""
     with Archive(path) as archive:
         description, root, platforms = description_of(archive), parse(archive), archive.platforms()
+    tool = description.generationTool or "unknown"
     facts = [
         ("model", f"{description.modelName}, FMI {description.fmiVersion}"),
-        ("made by", f"{description.generationTool or 'unknown'}, {description.generationDateAndTime or ''}"),
+        ("made by", ", ".join(filter(None, (tool, description.generationDateAndTime)))),
         ("description", (description.description or "").partition("\n")[0]),
         ("platforms", ", ".join(platforms) or "none (sources only)"),
         ("Co-Simulation", _capabilities(root, "CoSimulation")),

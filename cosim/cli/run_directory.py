@@ -62,6 +62,7 @@ class RunDirectory:
         figures: bool = False,
     ) -> list[str]:
         """Write a run; return its metrics as lines of text, and a last line with the files."""
+        self._write("result.npz", result.save)  # first: the study's metrics and figures may fail
         metrics = scenario.metrics(study, result)
         record = {
             "scenario": scenario.name,
@@ -80,7 +81,6 @@ class RunDirectory:
             "schedule": result.schedule.splitlines(),
             "versions": {name: version(name) for name in _TOOLS} | {"python": platform.python_version()},
         }
-        self._write("result.npz", result.save)
         text = json_text(record) + "\n"
         self._write("metrics.json", lambda path: path.write_text(text, encoding="utf-8"))
         names = self._draw(study, result) if figures else []

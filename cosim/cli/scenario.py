@@ -172,12 +172,17 @@ class Scenario:
         found = self._parts.get(name)
         return float(found) if isinstance(found, (int, float)) else None
 
-    def metrics(self, study: Any, result: Any) -> dict[str, tuple[float, str]]:
-        """Return named numbers with units: the study's own, or peak and RMS of every scalar port."""
+    def run(self, study: Any, **more: Any) -> Result:
+        """Run the study; refuse a value that is not a Result."""
+        result = study.run(**more)
         if not isinstance(result, Result):
             raise ScenarioError(
                 f"scenario {self.name}: run() returned {_kind(result)}; return the Result of simulate()"
             )
+        return result
+
+    def metrics(self, study: Any, result: Result) -> dict[str, tuple[float, str]]:
+        """Return named numbers with units: the study's own, or peak and RMS of every scalar port."""
         if callable(getattr(study, "metrics", None)):
             found = study.metrics(result)
             self._check_metrics(found)

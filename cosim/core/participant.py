@@ -346,7 +346,10 @@ class Block(Participant):
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if "der" in cls.__dict__ or "derivatives" in cls.__dict__:
-            raise DeclarationError(f"{cls.__name__}: a Block has no derivatives; derive from Continuous")
+            raise DeclarationError(
+                f"{cls.__name__}: a Block has no derivatives; write the next value of a state in "
+                "step(self, t, h), or derive from Continuous for equations that hold between the steps"
+            )
 
     def step(self, t: float, h: float) -> None:
         """Read the inputs at t, write the outputs that hold until the next call; h is the step."""

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
-from types import NoneType
+from types import MappingProxyType, NoneType
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,7 @@ class FMUFile:
 
     def _take_start(self, start: Mapping[str, Any]) -> None:
         """Take over start values, which may change the shapes of ports; refuse those that do not fit."""
-        self.start = dict(start)
+        self._start = dict(start)
         #: the clocks of FMI 3.0
         self.clocks = clocks_of(self.path.name, self.variables.values(), self.start)
         numeric = [v for v in self.variables.values() if v.type in self.version.numbers]
@@ -104,6 +104,11 @@ class FMUFile:
                 f"{self.path} has no library {' or '.join(dict.fromkeys(wanted))}, which the modelIdentifier "
                 "in its modelDescription.xml names; export it again"
             )
+
+    @property
+    def start(self) -> Mapping[str, Any]:
+        """The start values by name. They are checked once, so they cannot be changed; see `with_start`."""
+        return MappingProxyType(self._start)
 
     def shape_of(self, variable: Any) -> Shape:
         """Return the shape of a variable, which structural parameters in `start` may change."""

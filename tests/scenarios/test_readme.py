@@ -11,7 +11,6 @@ import pytest
 
 import scenarios
 from cosim.cli.app import main
-from cosim.cli.python_scenario import scenario_names
 from scenarios.chattering.table import Table as Chattering
 from scenarios.highway_bridge.table import Table as HighwayBridge
 from scenarios.highway_bridge.table import means_text
@@ -65,12 +64,6 @@ def test_the_commands_exist(
         elif command == "export":
             main([command, *words])
             assert Path(words[-1]).is_file()
-
-
-def test_the_list_is_complete() -> None:
-    text = (FOLDER / "README.md").read_text(encoding="utf-8")
-    for name in scenario_names():
-        assert f"[{name}.py]({name}.py)" in text or f"[{name}/]({name}/README.md)" in text
 
 
 def test_the_table_of_chapter_4() -> None:

@@ -9,11 +9,12 @@ import zipfile
 import numpy as np
 import pytest
 
+from cosim import Result
 from tests.cosim.cli.command import call
 
 SCENARIO = '''
 """A mass that is braked."""
-from cosim import Block, Continuous, Input, Output, Parameter, State, System, simulate
+from cosim import Block, Continuous, Input, Output, Parameter, Result, State, System, simulate
 
 class Mass(Continuous):
     F = Input("force", unit="N")
@@ -185,6 +186,14 @@ def test_a_scenario_that_returns_something_else_is_refused(tmp_path, capsys, old
     path = tmp_path / "wrong.py"
     path.write_text(SCENARIO.replace(old, new))
     assert words in refused(capsys, "run", path, "--out", tmp_path / "out")
+
+
+def test_metrics_that_fail_do_not_lose_the_run(tmp_path, capsys):
+    """The result is on disk before the study's own code computes from it."""
+    path = tmp_path / "wrong.py"
+    path.write_text(SCENARIO.replace("def run(", METRICS.replace("{}", "{'v': result['plant.vv']}")))
+    assert "has no signal 'plant.vv'" in refused(capsys, "run", path, "--out", tmp_path / "out")
+    assert len(Result.load(tmp_path / "out" / "result.npz").time) > 1
 
 
 @pytest.mark.parametrize("name", ["random", "json", "numpy"])

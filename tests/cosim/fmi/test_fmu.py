@@ -171,3 +171,12 @@ def test_lines_of_the_log_go_to_the_fmu_that_they_come_from(capsys):
     of_b.logger(of_b.componentEnvironment, b"b", 3, b"", b"too late")  # its instance is gone
     of_a.logger(None, b"another", 1, b"", b"of FMPy")
     assert capsys.readouterr().out == "[WARNING] of FMPy\n"
+
+
+def test_start_values_cannot_be_changed_behind_their_check(fmu_path):
+    """A start value written into the FMU after its check would be ignored in silence."""
+    fmu = FMU(fmu_path)
+    with pytest.raises(TypeError, match="does not support item assignment"):
+        fmu.start["k"] = 2.0
+    assert fmu.with_start({"k": 2.0}).start == {"k": 2.0}
+    assert fmu.start == {}

@@ -13,7 +13,7 @@ from fmus.elements.element import OWN, Element
 
 
 def memory(element: Element, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return parameters and two memories of the given number of rows; only the last row has the parameters."""
+    """Return parameters and two memories with `rows` rows; only the last row has the parameters."""
     p = np.zeros((rows, len(element.parameters)))
     p[-1] = element.parameters
     z = np.zeros((2, rows, OWN + element.memory))
