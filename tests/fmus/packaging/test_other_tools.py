@@ -50,7 +50,7 @@ def test_a_table_without_ecos_says_so(
 ) -> None:
     monkeypatch.setitem(sys.modules, "ecospy", None)
     rows = controller_in_ssp.table(ssp=tmp_path / "loop.ssp")
-    assert [row["loop"] for row in rows] == ["late", "ours"]
+    assert [row["loop"] for row in rows] == ["here, late", "here"]
     assert "ecospy cannot be imported" in capsys.readouterr().out
 
 
