@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import CompilationError
-from .kernels import cache_directory, cached
+from .cache import cache_directory, cached
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,8 @@ storage, versions of the tools.
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 import sys
-import tempfile
 import threading
 import types
 from collections.abc import Callable, Mapping
@@ -23,10 +21,10 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
-from platformdirs import user_cache_path
 
 from ..core.participant import Participant
-from ..errors import CompilationError, CosimError
+from ..errors import CompilationError
+from .cache import cached
 from .names import check_names
 
 _LIBRARIES = {"numpy", "math", "numba", "scipy", "llvmlite", "builtins"}
@@ -42,41 +40,6 @@ _REMEDY = {
     "Py": "it needs the Python runtime (an exception, a string, a Python object)",
     "numba_": "it needs Numba's runtime",
 }
-
-
-def cache_directory() -> Path:
-    """Return the folder for compiled code; the environment variable STRUCTCOSIM_CACHE moves it."""
-    chosen = os.environ.get("STRUCTCOSIM_CACHE")
-    path = Path(chosen) if chosen else user_cache_path("structcosim", appauthor=False)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CosimError(
-            f"compiled code cannot be stored in {path}: {error.strerror}; "
-            "name a writable folder in the environment variable STRUCTCOSIM_CACHE"
-        ) from error
-    return path
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file so that another process sees either the whole file or none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def cached(name: str, make: Callable[[], bytes]) -> Path:
-    """Return a file of the cache; make its content if it does not exist."""
-    path = cache_directory() / name
-    if not path.exists():
-        write_atomically(path, make())
-    return path
 
 
 # ------------------------------------------------------------------- fingerprint

@@ -10,12 +10,14 @@ are not part of the key.
 from __future__ import annotations
 
 import hashlib
+import tempfile
 from functools import lru_cache
 from pathlib import Path
 
 from cosim import FMU, Participant
 from cosim.codegen import c_compiler
-from cosim.codegen.kernels import cache_directory, kernel_key
+from cosim.codegen.cache import cached
+from cosim.codegen.kernels import kernel_key
 
 from .fmu import export
 from .link import warm_up
@@ -41,10 +43,13 @@ def cache_key(participant: Participant) -> str:
 
 def as_fmu(participant: Participant) -> FMU:
     """Export a participant with its present values and load the FMU; `FMU.source` is the participant."""
-    path = cache_directory() / "fmus" / cache_key(participant) / f"{type(participant).__name__}.fmu"
-    if not path.exists():
+    name = f"{type(participant).__name__}.fmu"
+
+    def exported() -> bytes:
         warm_up()
-        export(participant, path)
-    fmu = FMU(path)
+        with tempfile.TemporaryDirectory() as folder:
+            return export(participant, Path(folder) / name).read_bytes()
+
+    fmu = FMU(cached(f"fmus/{cache_key(participant)}/{name}", exported))
     fmu.source = participant
     return fmu

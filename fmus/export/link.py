@@ -29,7 +29,7 @@ from cosim.codegen.c_compiler import (
     host,
     zig_cc,
 )
-from cosim.codegen.kernels import cache_directory
+from cosim.codegen.cache import cache_directory
 from cosim.core.variables import KINDS, Variable
 
 KERNELS = ("initialize", "derivatives", "outputs", "advance", "step")

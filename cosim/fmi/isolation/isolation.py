@@ -36,7 +36,7 @@ from ...codegen.c_compiler import (
     host,
     zig_cc,
 )
-from ...codegen.kernels import cache_directory
+from ...codegen.cache import cache_directory
 from ...errors import CompilationError, FMUError
 from ...loop.signals import RunSignals
 from .functions import sources as generated_sources

@@ -19,7 +19,7 @@ import fmus.export.fmu
 import fmus.export.link
 from cosim import Block, CompilationError, Input, Output
 from cosim.codegen.c_compiler import fmi_headers
-from cosim.codegen.kernels import cache_directory
+from cosim.codegen.cache import cache_directory
 from fmus.export import ExportError, export
 from fmus.export.fmu import FMI_VERSIONS, write_archive
 from fmus.export.link import build_model
