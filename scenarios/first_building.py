@@ -2,18 +2,14 @@
 
     cosim run first_building --limit 20000 --out out/mine
 
-An LQR, designed on the building's own matrices, pulls at the roof; its state comes from an
-observer of the acceleration that one noisy sensor measures there.
+An LQR pulls at the roof; an observer estimates its state from one noisy accelerometer there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from controllers.design.design_model import DesignModel
+from controllers.design.design_model import DesignModel, first_order
 from controllers.laws.state_feedback import StateFeedback
 from controllers.observers.observer import Observer
 from cosim import Result, System, el_centro, simulate
@@ -21,16 +17,14 @@ from cosim.blocks import MeasurementNoise, RecordSource, Saturation
 from fmus.export import as_fmu
 from fmus.plants.shear_building import ShearBuilding, stiffness_matrix
 
-STEP, STOP = 0.005, 40.0
+STEP, STOP = 0.005, 40.0  # s
 MASS, STIFFNESS, DAMPING = [20e3] * 5, [30e6, 28e6, 25e6, 20e6, 15e6], 0.02  # kg, N/m, of critical
 
 
 def design_model(building: ShearBuilding) -> DesignModel:
     """Return x' = A x + B u + E a_g of displacements and velocities; the roof's acceleration is measured."""
-    m, K = np.diag(MASS), stiffness_matrix(np.array(STIFFNESS))
-    n, roof = len(m), np.eye(len(m))[:, -1:]
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(m, np.hstack([K, building.C]))]])
-    B, E = np.vstack([0 * roof, np.linalg.solve(m, roof)]), np.vstack([0 * roof, -np.ones((n, 1))])
+    A = first_order(np.diag(MASS), building.C, stiffness_matrix(np.array(STIFFNESS)))
+    B, E = np.eye(10)[:, -1:] / MASS[-1], np.repeat([[0.0], [-1.0]], 5, axis=0)
     return DesignModel(A=A, B=B, E=E, C=A[-1:], D=B[-1:], F=np.zeros((1, 1)))
 
 
@@ -51,22 +45,19 @@ class Study:
         system = System({"building": as_fmu(building), "ground": RecordSource(el_centro())})
         system.connect("ground.y", "building.ground_acceleration")
         if self.control:
-            model = design_model(building)
-            Q, R = np.diag([0.0] * len(MASS) + [1.0] * len(MASS)), np.array([[self.R]])
+            model, Q = design_model(building), np.diag([0.0] * 5 + [1.0] * 5)
             system.add("sensor", MeasurementNoise([0.01], sample_period=STEP, unit="m/s^2"))
             system.add("observer", Observer.design(model, np.eye(1), 1e-3 * np.eye(1), STEP))
-            system.add("control", StateFeedback.lqr(model, Q, R))
+            system.add("control", StateFeedback.lqr(model, Q, np.array([[self.R]])))
             system.add("actuator", Saturation(self.limit))
-            system.connect("building.acceleration[5]", "sensor.u[1]")
-            system.connect("sensor.y", "observer.y")
-            system.connect("observer.x_hat", "control.x_hat")
-            system.connect("control.u", "actuator.u[1]")
-            system.connect("actuator.y[1]", "building.force[5]")
+            chain = [("building.acceleration[5]", "sensor.u[1]"), ("sensor.y", "observer.y")]
+            chain += [("observer.x_hat", "control.x_hat"), ("control.u", "actuator.u[1]")]
+            for source, target in [*chain, ("actuator.y[1]", "building.force[5]")]:
+                system.connect(source, target)
             system.connect("actuator.y", "observer.u_last", initial=0.0)  # the force of the last step
         return system
 
     def run(self) -> Result:
-        """Run the record."""
         return simulate(self.build(), step=STEP, stop=STOP)
 
     def metrics(self, result: Result) -> dict[str, tuple[float, str]]:
@@ -75,12 +66,11 @@ class Study:
         peaks = {p: [np.max(s[f"building.{p}"].peak) for s in both] for p in ("drift", "acceleration")}
         return {f"{p} over uncontrolled": (own / free, "1") for p, (own, free) in peaks.items()}
 
-    def figures(self, result: Result) -> dict[str, Any]:
+    def figures(self, result: Result) -> dict[str, object]:
         """Return the roof's displacement with and without control."""
         from matplotlib.figure import Figure  # half a second
 
-        figure = Figure(figsize=(8.0, 3.5), layout="constrained")
-        axes = figure.subplots()
+        axes = (figure := Figure(figsize=(8.0, 3.5), layout="constrained")).subplots()
         for run, label in ((replace(self, control=False).run(), "uncontrolled"), (result, "this run")):
             axes.plot(run.time, 1e3 * run["building.x"][:, -1], linewidth=0.8, label=label)
         axes.set(xlabel="time (s)", ylabel="roof displacement (mm)")
