@@ -37,13 +37,23 @@ def cache_directory() -> Path:
 
 def cached(name: str, make: Callable[[], bytes]) -> Path:
     """Return a file of the cache; make its content if it is missing or damaged."""
+    return _entry(name, make)[0]
+
+
+def cached_bytes(name: str, make: Callable[[], bytes]) -> bytes:
+    """Return the content of a file of the cache; make it if it is missing or damaged."""
+    return _entry(name, make)[1]
+
+
+def _entry(name: str, make: Callable[[], bytes]) -> tuple[Path, bytes]:
     path = cache_directory() / name
-    if not _is_intact(path):
+    data = _intact(path)
+    if data is None:
         data = make()
         path.parent.mkdir(parents=True, exist_ok=True)
         _write(path, data)
         _write(_hash_file(path), _hash(data))
-    return path
+    return path, data
 
 
 def _hash_file(path: Path) -> Path:
@@ -54,11 +64,13 @@ def _hash(data: bytes) -> bytes:
     return hashlib.sha256(data).hexdigest().encode()
 
 
-def _is_intact(path: Path) -> bool:
+def _intact(path: Path) -> bytes | None:
+    """Return the content of an entry, None if it is missing or damaged."""
     try:
-        return _hash_file(path).read_bytes() == _hash(path.read_bytes())
+        data = path.read_bytes()
+        return data if _hash_file(path).read_bytes() == _hash(data) else None
     except OSError:
-        return False
+        return None
 
 
 def _write(path: Path, data: bytes) -> None:

@@ -24,7 +24,7 @@ import llvmlite.binding as llvm
 
 from ..core.participant import Participant
 from ..errors import CompilationError
-from .cache import cached
+from .cache import cached_bytes
 from .names import check_names
 
 _LIBRARIES = {"numpy", "math", "numba", "scipy", "llvmlite", "builtins"}
@@ -257,7 +257,7 @@ def lower(participant: Participant) -> str:
     naming class and kernel, when Numba cannot compile a kernel or when the code needs Python.
     """
     file = f"kernels/{kernel_key(participant)}.ll"
-    return cached(file, lambda: _lower_kernels(participant).encode()).read_text()
+    return cached_bytes(file, lambda: _lower_kernels(participant).encode()).decode()
 
 
 def _lower_kernels(participant: Participant) -> str:
